@@ -18,9 +18,10 @@ ExchangeSource choose_form_factors(const BuildSettings& settings, const PatchMod
   }
   if (settings.exchange_source != ExchangeSource::kAutomatic) return settings.exchange_source;
   const std::size_t n = model.patches.size();
-  const bool too_many = n > kPairsPatchCount ||
-                        peak_bytes_of_pairs(n, distinct_channels(model.patches.reflectance),
-                                            settings.operator_kind) > memory_limit_bytes(settings);
+  const bool too_many =
+      n > kPairsPatchCount ||
+      peak_bytes_of_pairs(built_scene(n, model.mesh), distinct_channels(model.patches.reflectance),
+                          settings.operator_kind, settings.rank) > memory_limit_bytes(settings);
   return from_links && too_many ? ExchangeSource::kLinks : ExchangeSource::kPairs;
 }
 

@@ -18,37 +18,54 @@
 namespace rebounce {
 namespace {
 
-// Memory of each stage at its peak. Arrays that grow by doubling count with their spare capacity,
-// and with both copies while they move.
+// Memory of each stage at its peak, by its arrays where they are counted and else as measured
+// (lab/114). What a stage frees is given back at its end.
 
 // An entry of an ExchangeMatrix: a column and an exchange area.
 constexpr std::size_t kEntryBytes = sizeof(std::uint32_t) + sizeof(float);
 
-// A pair while form factors are computed: in rows, and in the matrix that they are copied to.
-constexpr std::size_t kPairBytesMade = sizeof(ExchangeEntry) + 3 * kEntryBytes;
+// A pair while form factors are computed: in rows, which grow by doubling, and in the matrix that
+// they are copied to.
+constexpr std::size_t kPairBytesMade = 3 * sizeof(ExchangeEntry) / 2 + kEntryBytes;
 
-// A pair beside a dense inverse: in the matrix, and expanded to rows that hold it twice.
-constexpr std::size_t kPairBytesKept = 2 * kEntryBytes + 2 * kEntryBytes;
+// A pair beside a dense inverse: in the matrix, and expanded to rows.
+constexpr std::size_t kPairBytesKept = 2 * kEntryBytes;
 
-// What libraries take when they are first used, Embree and OpenBLAS above all (lab/106).
-constexpr std::size_t kLibraryBytes = 12'000'000;
+// A patch while form factors are computed: its points, and what its hemisphere rays meet.
+constexpr std::size_t kPatchBytesOfPairs = 21'000;
+
+// A micro-triangle of an opacity map, where points are chosen on patches.
+constexpr std::size_t kMicroTriangleBytes = 44;
+
+// Weights at the vertices of the mesh: of each, and of those that several patches are near to, of
+// which a patch has this many at most.
+constexpr std::size_t kVertexBytes = 400, kWeighedBytes = 3000, kWeighedOfPatch = 10;
+
+// What libraries take when they are first used, Embree and OpenBLAS above all: the latter in
+// proportion to the products, up to the size of its buffers.
+constexpr std::size_t kLibraryBytes = 2'000'000, kLibraryBytesOfPatch = 12'000,
+                      kMostLibraryBytes = 12'000'000;
+
+// Copies of the factors of a low-rank operator while they are found.
+constexpr std::size_t kFactorCopies = 8;
 
 // A link during refinement: the link, its copy, and the flat arrays.
-constexpr std::size_t kLinkBytesFound = 4 * sizeof(Link);
+constexpr std::size_t kLinkBytesFound = 100;
+// A patch then, as from pairs.
+constexpr std::size_t kPatchBytesOfLinks = 17'500;
 
-// A link afterwards: the flat arrays, and the gathering order by both nodes.
+// A link afterwards: its flat arrays, the gathering order by both nodes, and fewer links.
 constexpr std::size_t kFlatLinkBytes = sizeof(FormFactorLinks{}.pair[0]) +
                                        sizeof(FormFactorLinks{}.exchange_area[0]) +
                                        sizeof(FormFactorLinks{}.gradient[0]);
-constexpr std::size_t kLinkBytesKept = 2 * kFlatLinkBytes + LinkedFormFactors::kBytesPerLink;
+constexpr std::size_t kLinkBytesKept = kFlatLinkBytes + LinkedFormFactors::kBytesPerLink + 14;
 
-// Upper estimate of the memory of a patch beside links: its triangles, in the mesh and in the ray
-// tracer; radiosities under 274 lights; compressed form factors.
-constexpr std::size_t kPatchBytes = 8000;
+// A patch beside links: compressed form factors and what they are fitted to, without the lights.
+constexpr std::size_t kPatchBytes = 3000;
 
-// Upper estimate of the links of a patch over the cube root of the number of patches:
-// furnished rooms have 10 to 10.5, empty ones a quarter of it (lab/059).
-constexpr double kFurnishedLinks = 11;
+// The links of a patch over the cube root of the number of patches: furnished rooms have 7.5 to 10
+// (lab/059), empty ones a quarter of it.
+constexpr double kLinksOfPatch = 7;
 
 std::string in_gib(std::uint64_t bytes) {
   return fmt::format("{:.3g} GiB", static_cast<double>(bytes) / (1ULL << 30));
@@ -63,12 +80,18 @@ CostEstimate estimate_of(std::size_t patch_count, const PatchRoles& roles) {
 }
 
 std::uint64_t bytes_beside_transfer(const LinkedBuild& build) {
-  return kPatchBytes * build.patch_count + kLinkBytesKept * build.link_count;
+  return build.held_bytes + kPatchBytes * build.scene.patch_count +
+         kLinkBytesKept * build.link_count;
 }
 
-std::size_t links_of_furnished_room(std::size_t patch_count) {
+std::size_t usual_link_count(std::size_t patch_count) {
   const auto n = static_cast<double>(patch_count);
-  return static_cast<std::size_t>(kFurnishedLinks * std::cbrt(n) * n);
+  return static_cast<std::size_t>(kLinksOfPatch * std::cbrt(n) * n);
+}
+
+std::uint64_t bytes_of_weights(const BuiltScene& scene) {
+  return kVertexBytes * scene.vertex_count +
+         kWeighedBytes * std::min(scene.vertex_count, kWeighedOfPatch * scene.patch_count);
 }
 
 }  // namespace
@@ -77,31 +100,60 @@ std::uint64_t memory_limit_bytes(const BuildSettings& settings) {
   return settings.memory_limit_bytes > 0 ? settings.memory_limit_bytes : machine_memory_bytes() / 2;
 }
 
-std::uint64_t peak_bytes_of_pairs(std::size_t patch_count, std::size_t matrix_count,
-                                  OperatorKind kind) {
-  const std::uint64_t pairs = static_cast<std::uint64_t>(patch_count) * patch_count / 4;
+BuiltScene built_scene(std::size_t patch_count, const DisplayMesh& mesh) {
+  BuiltScene scene{patch_count, mesh.position.size(), 0};
+  for (const std::uint32_t map : mesh.opacity.triangle_map) {
+    if (map != kNone) scene.micro_triangle_count += mesh.opacity.map(map).size();
+  }
+  return scene;
+}
+
+LinkedBuild linked_build(const BuiltScene& scene, std::size_t link_count,
+                         std::span<const Float3> reflectance, const PatchRoles& roles,
+                         double tolerance) {
+  const std::uint64_t held = resident_memory_bytes(), links = kFlatLinkBytes * link_count;
+  return {scene,      held > links ? held - links : 0,
+          link_count, distinct_channels(reflectance),
+          roles,      tolerance};
+}
+
+std::uint64_t peak_bytes_of_pairs(const BuiltScene& scene, std::size_t matrix_count,
+                                  OperatorKind kind, std::size_t rank) {
+  const std::uint64_t n = scene.patch_count, pairs = n * n / 4;
+  const std::uint64_t found = kPairBytesMade * pairs + kPatchBytesOfPairs * n +
+                              kMicroTriangleBytes * scene.micro_triangle_count;
+  const std::uint64_t libraries =
+      std::min(kMostLibraryBytes, kLibraryBytes + kLibraryBytesOfPatch * scene.patch_count);
+  const std::uint64_t before = resident_memory_bytes() + libraries;
+  const std::uint64_t most = std::max(found, kEntryBytes * pairs + bytes_of_weights(scene));
+  if (kind == OperatorKind::kNoOperator) return before + most;
   const std::uint64_t inverses =
-      kind == OperatorKind::kNoOperator
-          ? 0
-          : dense_transfer_peak_bytes(patch_count, matrix_count, arithmetic_of(kind));
-  const std::uint64_t compression = kind == OperatorKind::kHierarchical
-                                        ? dense_compression_peak_bytes(patch_count, matrix_count)
-                                        : 0;
-  return resident_memory_bytes() + kLibraryBytes +
-         std::max({kPairBytesMade * pairs, kPairBytesKept * pairs + inverses,
-                   kEntryBytes * pairs + compression});
+      dense_transfer_peak_bytes(scene.patch_count, matrix_count, arithmetic_of(kind));
+  std::uint64_t compression = 0;
+  if (kind == OperatorKind::kHierarchical) {
+    compression = dense_compression_peak_bytes(scene.patch_count, matrix_count);
+  } else if (kind == OperatorKind::kLowRank) {
+    const std::uint64_t factors = kFactorCopies * n * std::min<std::uint64_t>(rank, n);
+    compression = (n * n / 2 + factors) * matrix_count * sizeof(float);
+  }
+  return before +
+         std::max({most, kPairBytesKept * pairs + inverses, kEntryBytes * pairs + compression});
 }
 
 std::uint64_t peak_bytes_of_links(const LinkedBuild& build) {
-  return kPatchBytes * build.patch_count + kLinkBytesFound * build.link_count;
+  return build.held_bytes + kPatchBytesOfLinks * build.scene.patch_count +
+         kLinkBytesFound * build.link_count +
+         kMicroTriangleBytes * build.scene.micro_triangle_count;
 }
 
 std::uint64_t peak_bytes_after_links(const LinkedBuild& build, std::uint64_t limit_bytes) {
   MatrixFreeTransferSettings settings{.compression = {.tolerance = build.tolerance},
                                       .roles = build.roles};
   settings.memory_limit_bytes = memory_of_matrix_free_transfer(build, limit_bytes);
+  const MatrixFreeTransferPlan plan =
+      plan_matrix_free_transfer(build.scene.patch_count, build.matrix_count, settings);
   return bytes_beside_transfer(build) +
-         plan_matrix_free_transfer(build.patch_count, build.matrix_count, settings).peak_bytes;
+         std::max<std::uint64_t>(plan.peak_bytes, bytes_of_weights(build.scene));
 }
 
 std::uint64_t memory_of_matrix_free_transfer(const LinkedBuild& build, std::uint64_t limit_bytes) {
@@ -111,14 +163,16 @@ std::uint64_t memory_of_matrix_free_transfer(const LinkedBuild& build, std::uint
 
 CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
                            const BuildSettings& decided) {
-  const std::size_t n = model.patches.size();
+  const BuiltScene scene = built_scene(model.patches.size(), model.mesh);
   const std::uint32_t matrices = distinct_channels(model.patches.reflectance);
-  CostEstimate estimate = estimate_of(n, roles);
+  CostEstimate estimate = estimate_of(scene.patch_count, roles);
   if (decided.exchange_source == ExchangeSource::kPairs) {
-    estimate.peak_bytes = peak_bytes_of_pairs(n, matrices, decided.operator_kind);
+    estimate.peak_bytes = peak_bytes_of_pairs(scene, matrices, decided.operator_kind, decided.rank);
     return estimate;
   }
-  const LinkedBuild build{n, links_of_furnished_room(n), matrices, roles, decided.tolerance};
+  const LinkedBuild build{
+      scene, resident_memory_bytes(), usual_link_count(scene.patch_count), matrices,
+      roles, decided.tolerance};
   estimate.peak_bytes = peak_bytes_of_links(build);
   if (decided.operator_kind != OperatorKind::kNoOperator) {
     estimate.peak_bytes =
@@ -139,9 +193,9 @@ void sample_pairs(const PatchModel& model, const RayTracer& tracer, const BuildS
 
 CostEstimate estimate_after_links(const PatchModel& model, std::size_t link_count,
                                   const PatchRoles& roles, const BuildSettings& decided) {
-  const LinkedBuild build{model.patches.size(), link_count,
-                          distinct_channels(model.patches.reflectance), roles, decided.tolerance};
-  CostEstimate estimate = estimate_of(build.patch_count, roles);
+  const LinkedBuild build = linked_build(built_scene(model.patches.size(), model.mesh), link_count,
+                                         model.patches.reflectance, roles, decided.tolerance);
+  CostEstimate estimate = estimate_of(build.scene.patch_count, roles);
   estimate.link_count = link_count;
   estimate.peak_bytes = peak_bytes_after_links(build, decided.memory_limit_bytes);
   return estimate;

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "precompute/base/progress.h"
 #include "precompute/compression/hierarchical_settings.h"
@@ -17,25 +18,42 @@ namespace rebounce {
 /// machine.
 std::uint64_t memory_limit_bytes(const BuildSettings& settings);
 
+/// The quantities that the memory of every build depends on.
+struct BuiltScene {
+  std::size_t patch_count = 0;
+  std::size_t vertex_count = 0;          ///< of the mesh that is shown
+  std::size_t micro_triangle_count = 0;  ///< of triangles with opacity maps
+};
+
+/// Those of patches and their mesh.
+BuiltScene built_scene(std::size_t patch_count, const DisplayMesh& mesh);
+
 /// Peak memory of the process while it makes form factors and operator from pairs, if half of all
 /// patches face each other: on top of what it holds when this is called.
-/// `matrix_count`: distinct reflectance channels.
-std::uint64_t peak_bytes_of_pairs(std::size_t patch_count, std::size_t matrix_count,
-                                  OperatorKind kind);
+/// `matrix_count`: distinct reflectance channels; `rank`: of a low-rank operator.
+std::uint64_t peak_bytes_of_pairs(const BuiltScene& scene, std::size_t matrix_count,
+                                  OperatorKind kind, std::size_t rank);
 
 /// The quantities that the memory of a build from links depends on.
 struct LinkedBuild {
-  std::size_t patch_count = 0;
+  BuiltScene scene{};
+  std::uint64_t held_bytes = 0;  ///< by the process without links
   std::size_t link_count = 0;
   std::uint32_t matrix_count = 1;  ///< distinct reflectance channels
   PatchRoles roles{};
   double tolerance = kDefaultTolerance;  ///< of the operator
 };
 
-/// Peak memory of finding the links.
+/// Of a model whose links are known and in memory.
+LinkedBuild linked_build(const BuiltScene& scene, std::size_t link_count,
+                         std::span<const Float3> reflectance, const PatchRoles& roles,
+                         double tolerance);
+
+/// Peak memory of the process while links are found.
 std::uint64_t peak_bytes_of_links(const LinkedBuild& build);
 
-/// Peak memory of all stages after links, with as many threads as the limit allows, at least one.
+/// Peak memory of the process in all stages after links, with as many threads as the limit allows,
+/// at least one.
 std::uint64_t peak_bytes_after_links(const LinkedBuild& build, std::uint64_t limit_bytes);
 
 /// The part of a limit that remains for build_matrix_free_transfer; 1 if nothing remains.

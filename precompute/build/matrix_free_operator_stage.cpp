@@ -116,6 +116,9 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
                               PhaseClock& clock) {
   const PatchTable& patches = data.patches;
   const std::uint64_t seed = decided.form_factors.seed;
+  const LinkedBuild build =
+      linked_build(built_scene(patches.size(), data.mesh), data.links.pair.size(),
+                   patches.reflectance, roles, decided.tolerance);
   // Used from the first light to the last check, so it is made once.
   const auto links =
       std::make_shared<const LinkedFormFactors>(data.links, patches.area, patches.centroid);
@@ -138,10 +141,7 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
     MatrixFreeTransferSettings settings;
     settings.compression = {decided.tolerance, *decided.precision};
     settings.roles = roles;
-    settings.memory_limit_bytes = memory_of_matrix_free_transfer(
-        {patches.size(), data.links.pair.size(), distinct_channels(patches.reflectance), roles,
-         decided.tolerance},
-        decided.memory_limit_bytes);
+    settings.memory_limit_bytes = memory_of_matrix_free_transfer(build, decided.memory_limit_bytes);
     settings.checkpoint = decided.checkpoint;
     return build_matrix_free_transfer(*data.compressed_form_factors, patches,
                                       lights.exitances.view(), settings, part);

@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "precompute/lights/error_bound.h"
 #include "precompute/lights/random_lights.h"
 #include "rebounce/operators.h"
 #include "runtime/lights/lamp_kind.h"
@@ -141,11 +143,13 @@ std::string operator_text(const TransferData& data, const json& settings) {
 std::string error_text(const json& report) {
   if (!report.contains("errors") || !report["errors"].is_object()) return "";
   std::string rows;
+  double fewest = std::numeric_limits<double>::infinity();
   for (const LightKind kind : kLightKinds) {
     const json& errors = report["errors"];
     const std::string key(name(kind));
     if (!errors.contains(key)) continue;
     const json& e = errors[key];
+    fewest = std::min(fewest, number_in(e, "lights"));
     rows += fmt::format("  {:<10} {:>6} {:>9} {:>9} {:>9}\n", key, number_in(e, "lights"),
                         percent(number_in(e, "mean")), percent(number_in(e, "max")),
                         percent(number_in(e, "bound")));
@@ -157,8 +161,10 @@ std::string error_text(const json& report) {
          fmt::format("  {:<10} {:>6} {:>9} {:>9} {:>9}\n", "light", "lights", "mean", "largest",
                      "bound") +
          rows +
-         "  No more than one in 1,000 further lights of a kind is above its bound (95 % "
-         "confidence).\n";
+         fmt::format(
+             "  No more than one in {:.0f} further lights of a kind is above its bound (95 % "
+             "confidence).\n",
+             std::floor(1 / part_above_bound(static_cast<std::size_t>(std::max(fewest, 1.0)))));
 }
 
 /// What the operator was made from; empty where the file does not say.

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "precompute/build/build_advice.h"
+#include "precompute/build/kept_tolerances.h"
 #include "precompute/build/transfer_build.h"
 #include "precompute/cli/commands.h"
 #include "precompute/cli/info_json.h"
@@ -125,35 +126,6 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
   for (const std::string& line : build_advice(data, report)) fmt::print("advice: {}\n", line);
 }
 
-// The largest error of the check may be this multiple of the tolerance. The promise is three times
-// as much for 64 lights; the check has four times as many, whose largest error lies higher.
-constexpr double kLargestOfCheck = 3.5;  // lab/103
-
-/// The file is written even if a tolerance is not reached; it holds the measured errors.
-void check_tolerances(const BuildRecord& record, const BuildReport& report,
-                      bool keeps_form_factors) {
-  if (record.tolerance > 0 && record.error_mean > record.tolerance) {
-    throw Error(fmt::format(
-        "the operator misses its tolerance: the mean error is {:.2g}, the tolerance {:.2g}; "
-        "raise --tolerance, or use --precision f32 or --operator dense",
-        record.error_mean, record.tolerance));
-  }
-  if (record.tolerance > 0 && record.error_max > kLargestOfCheck * record.tolerance) {
-    throw Error(fmt::format(
-        "the operator errs too much under single lamps: the largest error of the check is {:.2g}, "
-        "three times the tolerance is {:.2g}; the file is written: count it as one of tolerance "
-        "{:.2g}, or try another --seed or --operator dense",
-        record.error_max, kLargestOverMean * record.tolerance,
-        record.error_max / kLargestOverMean));
-  }
-  if (keeps_form_factors && report.form_factor_error->mean > report.form_factor_tolerance) {
-    throw Error(fmt::format(
-        "the compressed form factors miss their tolerance: the mean error is {:.2g}, the tolerance "
-        "{:.2g}; raise --compress-form-factors, or leave it out",
-        report.form_factor_error->mean, report.form_factor_tolerance));
-  }
-}
-
 /// --probes NX,NY,NZ or --probes SPACING.
 void parse_probes(const std::vector<float>& numbers, ProbeSettings& settings) {
   if (numbers.empty()) return;
@@ -221,6 +193,7 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   } else if (!options.quiet) {
     print_summary(data, report, file_bytes);
   }
+  // The file is written all the same, and holds the measured errors.
   check_tolerances(data.record, report, data.compressed_form_factors != nullptr);
 }
 

@@ -17,20 +17,20 @@
 namespace rebounce {
 namespace {
 
-// Upper estimate of the bytes per patch, for each matrix, of the operator of the first stage and
-// the rounds of the second. It holds at the default tolerance and grows with this power of 1 /
+// Bytes per patch, for each matrix, of the operator of the first stage and the rounds of the
+// second, as measured (lab/114). They hold at the default tolerance and grow with this power of 1 /
 // tolerance.
-constexpr double kOperatorBytes = 10.5e3, kOperatorGrowth = 0.4;
+constexpr double kOperatorBytes = 8.4e3, kOperatorGrowth = 0.4;
 
-// Of a patch while a dense operator is compressed, beside the lights: candidates of the search, the
-// blocks that are at work, and the light that they are judged by (lab/106).
-constexpr std::size_t kSearchBytes = 23000;
+// Of a patch while a dense operator is compressed, beside the lights: candidates of the search and
+// the light that they are judged by; blocks that are at work, at most so much (lab/114).
+constexpr std::size_t kSearchBytes = 7000, kWorkBytes = 16000, kMostWorkBytes = 12'000'000;
 
 }  // namespace
 
 MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::size_t matrix_count,
                                                  const MatrixFreeTransferSettings& settings) {
-  constexpr std::size_t kBlasBytes = 45'000'000;  // of OpenBLAS, for each thread that multiplies
+  constexpr std::size_t kBlasBytes = 20'000'000;  // of OpenBLAS, for each thread but the first
   constexpr std::size_t kVectors = 8;             // those of the solver, coefficients, entries of F
   constexpr std::size_t kBatchColumns = SolvedTransfer::kBatchColumns,
                         kWidth = PanelCompressor::kPanelWidth;
@@ -53,7 +53,7 @@ MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::s
     const auto threads = static_cast<std::size_t>(plan.thread_count);
     plan.panel_count = (threads + groups_of_panel - 1) / groups_of_panel;
     plan.peak_bytes = std::max(plan.panel_count * panel + threads * group, threads * piece) +
-                      threads * kBlasBytes + kept;
+                      (threads - 1) * kBlasBytes + kept;
     if (limit == 0 || plan.peak_bytes <= limit || threads == 1) return plan;
   }
 }
@@ -61,7 +61,8 @@ MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::s
 std::uint64_t dense_compression_peak_bytes(std::size_t patch_count, std::size_t matrix_count) {
   const std::uint64_t triangle = static_cast<std::uint64_t>(patch_count) * patch_count / 2;
   return triangle * sizeof(float) * matrix_count +
-         patch_count * (kFittingLightBytes + kSearchBytes);
+         patch_count * (kFittingLightBytes + kSearchBytes) +
+         std::min(kMostWorkBytes, kWorkBytes * patch_count);
 }
 
 /// Throws Error if there is a memory limit and a plan does not fit into it.

@@ -8,8 +8,7 @@
 namespace rebounce {
 namespace {
 
-// The part of further errors that may be above the bound (lab/104: a sample of 256 says nothing of
-// rarer ones).
+// The part of further errors of a usual tail that may be above the bound (lab/104).
 constexpr double kPartAbove = 1e-3;
 
 // The quantile of the normal distribution at the confidence, 95 %.
@@ -42,6 +41,11 @@ double error_bound(std::span<const double> errors) {
   const double index = sum / k / lower_gamma_part(k);
   const double times = k / (static_cast<double>(errors.size()) * kPartAbove);
   return std::max(sorted.front(), sorted[tail] * std::pow(std::max(1.0, times), index));
+}
+
+double part_above_bound(std::size_t count) {
+  constexpr double kDoubt = 0.05;
+  return 1 - std::pow(kDoubt, 1 / static_cast<double>(std::max<std::size_t>(count, 1)));
 }
 
 }  // namespace rebounce

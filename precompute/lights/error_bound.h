@@ -1,20 +1,30 @@
 #pragma once
 
+#include <cstddef>
 #include <span>
 
 namespace rebounce {
 
-/// A bound that no more than one in a thousand of further errors exceeds, with 95 % confidence;
-/// they are drawn like `errors`, each >= 0. It is at least the largest of these. Without errors: 0.
+/// A bound on further errors that are drawn like `errors`, each >= 0. It is at least the largest of
+/// these. Without errors: 0. It says two things, each with 95 % confidence:
 ///
-/// The largest eighth of the errors, k of them and at least 8, gives the index xi of the tail,
-/// which is taken as a power law (B. M. Hill, "A simple general approach to inference about the
-/// tail of a distribution", 1975). The upper limit of its 95 % confidence interval is used, that
-/// of a gamma distribution of shape k. The bound is the resulting quantile beyond the sample (I.
-/// Weissman, "Estimation of parameters and large quantiles based on the k largest observations",
-/// 1978): x_k (k / (n p))^xi with p = 1/1000. The errors of an operator are bounded, so their tail
-/// ends sooner than a power law: the bound is on the safe side. What is rarer than that, such as a
-/// lamp of which a hundred-thousandth arrives, shows in no sample of this size (lab/104).
+/// - Of any errors whatever, no more than a part 1 - 0.05^(1/n) of further ones is above the
+/// largest
+///   of n, and so above the bound (S. Wilks, "Determination of sample sizes for setting tolerance
+///   limits", 1941): one in 80 from n = 240 on.
+/// - Where the tail is a power law, or ends sooner, no more than one in a thousand is. The largest
+///   eighth of the errors, k of them and at least 8, gives its index xi (B. M. Hill, "A simple
+///   general approach to inference about the tail of a distribution", 1975). The upper limit of its
+///   95 % confidence interval is used, that of a gamma distribution of shape k. The bound is the
+///   resulting quantile beyond the sample (I. Weissman, "Estimation of parameters and large
+///   quantiles based on the k largest observations", 1978): x_k (k / (n p))^xi with p = 1/1000.
+///
+/// What is rarer than the sample shows and of another kind, such as a lamp on one patch of which a
+/// hundred-thousandth arrives, breaks the second and not the first (lab/115).
 double error_bound(std::span<const double> errors);
+
+/// The part of further errors that may be above the bound of `count` of them, whatever they are:
+/// the first of the statements above.
+double part_above_bound(std::size_t count);
 
 }  // namespace rebounce

@@ -21,7 +21,7 @@ struct KindError {
   int dark_count = 0;   ///< lights from which nothing arrives (arrives_nowhere)
   double mean = 0;
   double max = 0;
-  double bound = 0;  ///< one in a thousand further errors may be above: error_bound.h
+  double bound = 0;  ///< one in 80 further errors may be above: error_bound.h
 };
 
 /// The error of an operator under one light.

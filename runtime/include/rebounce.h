@@ -91,7 +91,7 @@ typedef struct rebounce_transfer_info {
   float error_mean;  /* measured: of the indirect irradiance under many point lights, relative to it
                         in the area-weighted L2 norm, the mean over these */
   float error_max;   /* the largest of these */
-  float error_bound; /* one in a thousand of further lights of a kind may err more, no more of them,
+  float error_bound; /* one in 80 of further lights of a kind may err more, no more of them,
                         with a confidence of 95 % */
 } rebounce_transfer_info;
 

@@ -18,21 +18,21 @@ constexpr std::uint64_t kPlenty = 1ULL << 40;
 
 TEST(BuildEstimate, OfPairsHoldsTheirArraysOfEveryKind) {
   // Half of all pairs: of 16 bytes in rows and 8 in the matrix, or beside the inverse of 8 in the
-  // matrix and twice 8 in rows.
+  // matrix and 8 in rows.
   constexpr std::size_t kPatches = 4096, kPairs = kPatches * kPatches / 4;
-  EXPECT_GE(peak_bytes_of_pairs(kPatches, 3, OperatorKind::kNoOperator), (16 + 8) * kPairs);
+  EXPECT_GE(peak_bytes_of_pairs({kPatches}, 3, OperatorKind::kNoOperator, 0), (16 + 8) * kPairs);
   for (const OperatorKind kind :
        {OperatorKind::kDense, OperatorKind::kHierarchical, OperatorKind::kLowRank}) {
     const bool dense = kind == OperatorKind::kDense;
     for (const std::size_t matrices : {1U, 3U}) {
       // Triangles of the operator in floats and of the system, in doubles if the operator is exact.
       const std::size_t triangles = 2 * kPairs * (4 * matrices + (dense ? 8 : 4));
-      const std::uint64_t bytes = peak_bytes_of_pairs(kPatches, matrices, kind);
+      const std::uint64_t bytes = peak_bytes_of_pairs({kPatches}, matrices, kind, 256);
       // In small scenes the lights that a hierarchical operator is fitted to take the most.
       if (kind == OperatorKind::kHierarchical) {
         EXPECT_GE(bytes, 2 * kPairs * 4 * matrices + kPatches * kFittingLightBytes);
       }
-      EXPECT_GE(bytes, (8 + 2 * 8) * kPairs + triangles);
+      EXPECT_GE(bytes, 2 * 8 * kPairs + triangles);
       // What the process holds counts too: with sanitizers more than all of it.
       EXPECT_LE(bytes, resident_memory_bytes() + 2 * ((8 + 2 * 8) * kPairs + triangles));
     }
@@ -40,14 +40,14 @@ TEST(BuildEstimate, OfPairsHoldsTheirArraysOfEveryKind) {
 }
 
 TEST(BuildEstimate, OfLinksHoldsTheirArrays) {
-  const LinkedBuild build{.patch_count = 64000, .link_count = 25'000'000, .matrix_count = 3};
+  const LinkedBuild build{.scene = {64000}, .link_count = 25'000'000, .matrix_count = 3};
   // As they are refined, and copied; then 36 bytes each in the file's arrays, and 20 at both nodes.
   EXPECT_GE(peak_bytes_of_links(build), (44 + 36) * build.link_count);
   EXPECT_GE(peak_bytes_after_links(build, kPlenty), (36 + 2 * 20) * build.link_count);
 }
 
 TEST(BuildEstimate, TakesTheMemoryThatIsLeft) {
-  const LinkedBuild build{.patch_count = 64000, .link_count = 20'000'000, .matrix_count = 3};
+  const LinkedBuild build{.scene = {64000}, .link_count = 20'000'000, .matrix_count = 3};
   const int before = omp_get_max_threads();
   omp_set_num_threads(8);
   const std::uint64_t free = peak_bytes_after_links(build, kPlenty),
@@ -63,29 +63,31 @@ TEST(BuildEstimate, TakesTheMemoryThatIsLeft) {
 }
 
 TEST(BuildEstimate, GrowsWithEverythingAndFallsWithReceiversAndSources) {
-  const LinkedBuild build{.patch_count = 30000, .link_count = 5'000'000, .matrix_count = 1};
+  const LinkedBuild build{.scene = {30000}, .link_count = 5'000'000, .matrix_count = 1};
   const auto bytes = [](const LinkedBuild& b) { return peak_bytes_after_links(b, kPlenty); };
   LinkedBuild larger = build, denser = build, coloured = build, finer = build, part = build;
-  larger.patch_count *= 2;
+  larger.scene.patch_count *= 2;
   denser.link_count *= 2;
   coloured.matrix_count = 3;
   finer.tolerance /= 5;
   for (const LinkedBuild& other : {larger, denser, coloured, finer}) {
     EXPECT_GT(bytes(other), bytes(build));
   }
-  part.roles.role.assign(build.patch_count, 0);
+  part.roles.role.assign(build.scene.patch_count, 0);
   std::fill_n(part.roles.role.begin(), 10000, PatchRoles::kBoth);
   EXPECT_LT(bytes(part), bytes(build));
   PatchModel model;
-  model.patches.area.assign(part.patch_count, 1);
-  model.patches.reflectance.assign(part.patch_count, {0.5F, 0.5F, 0.5F});
+  model.patches.area.assign(part.scene.patch_count, 1);
+  model.patches.reflectance.assign(part.scene.patch_count, {0.5F, 0.5F, 0.5F});
   BuildSettings decided;
   decided.memory_limit_bytes = kPlenty;
   const CostEstimate estimate = estimate_after_links(model, part.link_count, part.roles, decided);
   EXPECT_EQ(estimate.receiver_count, 10000U);
   EXPECT_EQ(estimate.source_count, 10000U);
   EXPECT_EQ(estimate.link_count, part.link_count);
-  EXPECT_EQ(estimate.peak_bytes, bytes(part));
+  // What the process holds counts, but for the links.
+  EXPECT_GE(estimate.peak_bytes, bytes(part));
+  EXPECT_LE(estimate.peak_bytes, bytes(part) + resident_memory_bytes());
 }
 
 TEST(BuildEstimate, IsRefusedAboveTheLimit) {

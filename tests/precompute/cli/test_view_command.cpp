@@ -3,13 +3,17 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <thread>
 
+#include "rebounce/engine.h"
 #include "runtime/images/coded_image.h"
 #include "tests/support/command_line.h"
+#include "transfer/file/transfer_file_io.h"
 
 namespace rebounce::test_view_command {
 namespace {
@@ -111,6 +115,47 @@ TEST_F(ViewCommand, DrawsALitScene) {
     EXPECT_GT(image.mean(c), 25);
     EXPECT_LT(image.mean(c), 200);
   }
+}
+
+TEST_F(ViewCommand, SharesItsFileWithEngines) {
+  const std::string alone = path("alone.png"), beside = path("beside.png");
+  const auto show = [&](const std::string& picture) {
+    EXPECT_EQ(
+        run({"view", file_, "--lights", kLights, "--quiet", "--screenshot", picture}).exit_code,
+        kDone);
+    return test::read_bytes(picture);
+  };
+  const std::string drawn = show(alone);
+
+  constexpr int kPlaces = 16;
+  const auto frame = [](Engine& engine, int place) {
+    Light lamp;
+    lamp.position = {0.1F + 0.02F * static_cast<float>(place), 0.3F, 0.1F};
+    engine.relight({&lamp, 1}, {});
+    return std::vector<Float3>(engine.radiosity().begin(), engine.radiosity().end());
+  };
+  const auto data = std::make_shared<const TransferData>(load_transfer_file(file_));
+  std::vector<std::vector<Float3>> expected;
+  Engine first(data);
+  for (int place = 0; place < kPlaces; ++place) expected.push_back(frame(first, place));
+
+  std::atomic<bool> is_drawn = false;
+  std::atomic<int> frames = 0, wrong = 0;
+  const auto play = [&](int begin) {
+    Engine engine(data);
+    for (int k = begin; !is_drawn || k < begin + kPlaces; ++k) {
+      if (frame(engine, k % kPlaces) != expected[static_cast<std::size_t>(k % kPlaces)]) ++wrong;
+      ++frames;
+    }
+  };
+  std::thread one(play, 0), other(play, 5);
+  const std::string drawn_beside = show(beside);
+  is_drawn = true;
+  one.join();
+  other.join();
+  EXPECT_EQ(wrong, 0);
+  EXPECT_GE(frames, 2 * kPlaces);
+  EXPECT_TRUE(drawn == drawn_beside);
 }
 
 TEST_F(ViewCommand, LooksAsThePictureOfRender) {

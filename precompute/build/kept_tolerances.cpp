@@ -1,0 +1,33 @@
+#include "precompute/build/kept_tolerances.h"
+
+#include <fmt/format.h>
+
+#include "precompute/lights/validation_error.h"
+#include "rebounce/error.h"
+
+namespace rebounce {
+
+void check_tolerances(const BuildRecord& record, const BuildReport& report, bool has_form_factors) {
+  if (record.tolerance > 0 && record.error_mean > record.tolerance) {
+    throw Error(fmt::format(
+        "the operator misses its tolerance: the mean error is {:.2g}, the tolerance {:.2g}; "
+        "raise --tolerance, or use --precision f32 or --operator dense",
+        record.error_mean, record.tolerance));
+  }
+  if (record.tolerance > 0 && record.error_max > kLargestOverMean * record.tolerance) {
+    throw Error(fmt::format(
+        "the operator errs too much under single lamps: the largest error of the check is {:.2g}, "
+        "three times the tolerance is {:.2g}; the file is written: count it as one of tolerance "
+        "{:.2g}, or try another --seed or --operator dense",
+        record.error_max, kLargestOverMean * record.tolerance,
+        record.error_max / kLargestOverMean));
+  }
+  if (has_form_factors && report.form_factor_error->mean > report.form_factor_tolerance) {
+    throw Error(fmt::format(
+        "the compressed form factors miss their tolerance: the mean error is {:.2g}, the tolerance "
+        "{:.2g}; raise --compress-form-factors, or leave it out",
+        report.form_factor_error->mean, report.form_factor_tolerance));
+  }
+}
+
+}  // namespace rebounce
