@@ -148,7 +148,7 @@ void make_operator_from_links(const RayTracer& tracer, std::span<const std::uint
                                       lights.exitances.view(), settings, part);
   });
   const ReferenceSolver solver = reference.preconditioned(data.transfer);
-  WholeErrorEstimator whole(data, roles, seed, {});
+  WholeErrorEstimator whole(data, roles, seed, WholeErrorEstimator::sample_for(patches.size()));
   const std::vector<KindError> errors = clock.run("check", [&](const Progress& part) {
     report.form_factor_error =
         form_factor_error(*data.compressed_form_factors, *links, patches, lights.test_radiosities);

@@ -105,6 +105,13 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
       operator_name(data.transfer->kind()), static_cast<double>(data.transfer->bytes()) / (1 << 20),
       static_cast<double>(data.transfer->bytes()) / static_cast<double>(report.patch_count),
       data.record.solve_residual, data.record.error_mean, data.record.error_max);
+  if (report.whole_error) {
+    const SampledError &whole = report.whole_error->whole, &links = report.whole_error->links;
+    fmt::print(
+        "with what links are off: {:.1e} +- {:.0e} mean, {:.1e} +- {:.0e} max (links alone {:.1e} "
+        "mean, {:.1e} max)\n",
+        whole.mean, whole.mean_confidence, whole.max, whole.max_confidence, links.mean, links.max);
+  }
   if (const PatchRoles& roles = data.transfer->roles(); !roles.all_are_both()) {
     fmt::print("receivers: {} patches, sources: {}\n",
                roles.count(PatchRoles::kReceiver, report.patch_count),
@@ -145,6 +152,15 @@ void check_tolerances(const BuildRecord& record, const BuildReport& report,
         "{:.2g}, or try another --seed or --operator dense",
         record.error_max, kLargestOverMean * record.tolerance,
         record.error_max / kLargestOverMean));
+  }
+  if (record.tolerance > 0 && report.whole_error &&
+      report.whole_error->whole.mean > record.tolerance) {
+    const SampledError &whole = report.whole_error->whole, &links = report.whole_error->links;
+    throw Error(fmt::format(
+        "the light misses the tolerance: with what links are off, the mean error is {:.2g}, the "
+        "tolerance {:.2g}; compression alone is off by {:.2g}, links by {:.2g}; the file is "
+        "written: count it as one of tolerance {:.2g}, or take --form-factors pairs",
+        whole.mean, record.tolerance, record.error_mean, links.mean, whole.mean));
   }
   if (keeps_form_factors && report.form_factor_error->mean > report.form_factor_tolerance) {
     throw Error(fmt::format(

@@ -6,6 +6,7 @@
 
 #include "precompute/base/parallel_progress.h"
 #include "precompute/exchange/pairs/escape.h"
+#include "precompute/exchange/pairs/hemisphere_exchange.h"
 #include "runtime/rays/patch_points.h"
 #include "runtime/rays/sampling.h"
 #include "transfer/base/area_norm.h"
@@ -22,6 +23,9 @@ constexpr double kSpreadResidual = 1e-2;
 
 // The quantile at 97.5 % of Student's distribution with kGroups - 1 = 3 degrees of freedom.
 constexpr double kStudent = 3.182;
+
+// Rays of a group, and of a patch of it at most (lab/111).
+constexpr std::size_t kRaysOfGroup = 1 << 23, kMostRays = 4096;
 
 // The lights whose errors are spread together, as many as are solved for together.
 constexpr std::size_t kLightsAtOnce = ReferenceSolver::kBatchLights / kGroups;
@@ -103,9 +107,9 @@ double area_product(std::span<const Float3> a, std::span<const Float3> b,
   return sum;
 }
 
-void add_to(std::span<Float3> sum, std::span<const Float3> values) {
+void add_to(std::span<Float3> sum, std::span<const Float3> values, float weight = 1) {
   for (std::size_t i = 0; i < sum.size(); ++i) {
-    for (int c = 0; c < kChannelCount; ++c) sum[i][c] += values[i][c];
+    for (int c = 0; c < kChannelCount; ++c) sum[i][c] += weight * values[i][c];
   }
 }
 
@@ -121,8 +125,11 @@ WholeErrorEstimator::WholeErrorEstimator(const TransferData& data, const PatchRo
   }
 }
 
-std::size_t WholeErrorEstimator::bytes_per_patch(std::size_t light_count) {
-  return 3 * sizeof(Float3) * light_count;
+WholeErrorEstimator::Sample WholeErrorEstimator::sample_for(std::size_t patch_count) {
+  Sample sample;
+  const std::size_t rays = kRaysOfGroup / std::min(patch_count, sample.patch_count);
+  sample.ray_count = static_cast<int>(std::min<std::size_t>(rays, kMostRays));
+  return sample;
 }
 
 void WholeErrorEstimator::add(std::span<const Float3> initial_exitance,
@@ -161,6 +168,7 @@ void WholeErrorEstimator::trace(std::span<const std::uint32_t> shown_patch, cons
 #pragma omp parallel
   {
     EscapeScratch scratch;
+    MetPatchCounter counter;
     std::vector<Float3> sum;
 #pragma omp for schedule(dynamic, 16)
     for (std::size_t k = 0; k < kGroups * rows; ++k) {
@@ -170,11 +178,10 @@ void WholeErrorEstimator::trace(std::span<const std::uint32_t> shown_patch, cons
       measure_escape(data_.mesh, shown_patch, triangles[i], i, tracer, ray_count_,
                      mix_bits(seed_ + kGroups + group), scratch);
       sum.assign(lights, Float3{0, 0, 0});
-      for (const std::uint32_t j : scratch.met) {
-        if (j != kNone) add_to(sum, std::span(by_patch).subspan(j * lights, lights));
+      for (const MetPatch& met : counter.count(n, scratch.met)) {
+        add_to(sum, std::span(by_patch).subspan(met.patch * lights, lights),
+               static_cast<float>(met.count) / static_cast<float>(ray_count_));
       }
-      const float part = 1 / static_cast<float>(ray_count_);
-      for (Float3& s : sum) s = {part * s[0], part * s[1], part * s[2]};
       add_to(residual_[group][row], sum);
       loop.advance();
     }
@@ -232,8 +239,9 @@ WholeErrorEstimator::Products WholeErrorEstimator::products(std::size_t light) c
 WholeError WholeErrorEstimator::estimate(std::span<const std::uint32_t> shown_patch,
                                          const RayTracer& tracer, const ReferenceSolver& reference,
                                          const Progress& progress) {
-  trace(shown_patch, tracer, part_of(progress, 0, kTracingPart));
   const std::size_t lights = compression_.size();
+  if (lights == 0) return {};
+  trace(shown_patch, tracer, part_of(progress, 0, kTracingPart));
   std::vector<Replicates> of_links, of_whole;
   for (std::size_t l = 0; l < lights; ++l) {
     if (l % kLightsAtOnce == 0) {

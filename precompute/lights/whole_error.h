@@ -38,8 +38,8 @@ class WholeErrorEstimator {
     int ray_count = 1024;            ///< of each of these patches
   };
 
-  /// Bytes per patch while it lives, with so many lights, beside those of the sample.
-  static std::size_t bytes_per_patch(std::size_t light_count);
+  /// The sample for so many patches: as many rays as memory and noise ask for.
+  static Sample sample_for(std::size_t patch_count);
 
   /// `data` must outlive the object. The same `seed` gives the same estimate.
   WholeErrorEstimator(const TransferData& data, const PatchRoles& roles, std::uint64_t seed,
@@ -50,9 +50,9 @@ class WholeErrorEstimator {
   void add(std::span<const Float3> initial_exitance, std::span<const Float3> truth,
            std::span<const Float3> result);
 
-  /// The errors over all lights. `shown_patch` [t] is that of PatchModel, `reference` solves with
-  /// the links. At least one light must have been added, and none may be added afterwards. Throws
-  /// Cancelled if asked to stop.
+  /// The errors over all lights; zeros without any. `shown_patch` [t] is that of PatchModel,
+  /// `reference` solves with the links. No light may be added afterwards. Throws Cancelled if asked
+  /// to stop.
   WholeError estimate(std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
                       const ReferenceSolver& reference, const Progress& progress = {});
 
@@ -72,7 +72,7 @@ class WholeErrorEstimator {
   Products products(std::size_t light) const;
 
   const TransferData& data_;
-  const PatchRoles& roles_;
+  PatchRoles roles_;
   std::uint64_t seed_;
   int ray_count_;
   std::array<std::vector<std::uint32_t>, kGroups> patch_;  ///< of each group, ascending
