@@ -90,13 +90,16 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--each", options.light_errors.each,
                  "CSV file for a row of every light: its error, and how much of it arrives");
+  app.add_option("--truth", options.light_errors.truth,
+                 "Transfer file of the same patches, whose form factors give the truth")
+      ->check(CLI::ExistingFile);
   app.add_flag("--iterate", options.light_errors.iterate,
                "Their truth by conjugate gradients alone, with neither a dense inverse nor the "
                "operator to begin with");
   add_common_options(app, options.common);
   return run_program(app, argc, argv, options.common, [&] {
     if (options.part == kLightErrors) {
-      options.input.with_truth = true;
+      options.input.with_truth = options.light_errors.truth.empty();
       options.common.repeats = 1;
     }
     run(options);

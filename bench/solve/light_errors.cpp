@@ -14,6 +14,7 @@
 #include "precompute/lights/validation_error.h"
 #include "rebounce/error.h"
 #include "transfer/base/area_norm.h"
+#include "transfer/file/transfer_file_io.h"
 
 namespace rebounce::bench {
 namespace {
@@ -31,10 +32,11 @@ constexpr int kLightsAtOnce = 1024;
 /// What arrives of lights, as the form factors of a file say.
 class Truth {
  public:
-  Truth(const TransferData& data, bool iterate)
+  /// `data` and `transfer`, an operator of the same patches, must outlive the object.
+  Truth(const TransferData& data, std::shared_ptr<const TransferOperator> transfer, bool iterate)
       : data_(data),
         plain_(data),
-        solver_(iterate ? plain_ : plain_.preconditioned(data.transfer)) {
+        solver_(iterate ? plain_ : plain_.preconditioned(std::move(transfer))) {
     if (!iterate && !data.exchange.empty()) {
       dense_ = build_dense_transfer(data.exchange, data.patches, Precision::kF32);
     }
@@ -65,12 +67,20 @@ class Truth {
   std::shared_ptr<const DenseOperator> dense_;  ///< null: solver_ iterates
 };
 
-/// What the file says of lights of one kind; nothing where it was not measured.
-std::optional<double> recorded_bound(const TransferData& data, LightKind kind) {
+/// A number of the report of a file; empty where it has none.
+Table::Cell recorded(const TransferData& data, const std::string& path) {
   const auto report = nlohmann::json::parse(data.report_json, nullptr, false);
-  const nlohmann::json::json_pointer place("/errors/" + std::string(name(kind)) + "/bound");
-  if (!report.contains(place) || !report.at(place).is_number()) return std::nullopt;
+  const nlohmann::json::json_pointer place(path);
+  if (!report.contains(place) || !report.at(place).is_number()) return {};
   return report.at(place).get<double>();
+}
+
+/// The data that hold the truth: those of `path`, or `data` where that is empty.
+std::shared_ptr<const TransferData> truth_of(const TransferData& data, const std::string& path) {
+  if (path.empty()) return {std::shared_ptr<const TransferData>(), &data};
+  auto other = std::make_shared<const TransferData>(load_transfer_file(path));
+  if (other->patches.area != data.patches.area) throw Error(path + " has other patches");
+  return other;
 }
 
 /// The number of patches that a light is on: the squared sum of their flux over the sum of squares.
@@ -104,9 +114,26 @@ Table::Cell groups_above(std::span<const LightError> errors, double limit) {
 }  // namespace
 
 Table make_light_error_table() {
-  return Table({"scene", "patches", "tolerance", "bytes_per_patch", "kind", "lights", "error_mean",
-                "error_max", "arriving_of_max", "over_3_tolerances", "groups_of_64_over",
-                "bound_of_kind", "over_bound_of_kind", "bound", "over_bound", "truth_error"});
+  return Table({"scene",
+                "patches",
+                "tolerance",
+                "bytes_per_patch",
+                "kind",
+                "lights",
+                "error_mean",
+                "error_max",
+                "arriving_of_max",
+                "over_3_tolerances",
+                "groups_of_64_over",
+                "bound_of_kind",
+                "over_bound_of_kind",
+                "bound",
+                "over_bound",
+                "truth_error",
+                "stated_mean",
+                "stated_mean_confidence",
+                "stated_max",
+                "stated_max_confidence"});
 }
 
 Table make_single_light_table() {
@@ -116,7 +143,8 @@ Table make_single_light_table() {
 void measure_light_errors(const TransferData& data, const LightErrorSettings& settings,
                           Table& table, Table& single) {
   const RayTracer tracer = make_surface_tracer(data.mesh);
-  const Truth truth(data, settings.iterate);
+  const auto with_truth = truth_of(data, settings.truth);
+  const Truth truth(*with_truth, data.transfer, settings.iterate);
   const BuildRecord& record = data.record;
   const double limit = kLargestOverMean * record.tolerance;
   for (const LightKind kind : kLightKinds) {
@@ -138,15 +166,32 @@ void measure_light_errors(const TransferData& data, const LightErrorSettings& se
     const auto worst = std::ranges::max_element(errors, {}, &LightError::error);
     double sum = 0;
     for (const LightError& light : errors) sum += light.error;
-    const auto bound = recorded_bound(data, kind);
+    const Table::Cell bound = recorded(data, "/errors/" + std::string(name(kind)) + "/bound");
+    const auto stated = [&](const std::string& what) {
+      return kind == LightKind::kPoint ? recorded(data, "/whole_error/whole/" + what)
+                                       : Table::Cell();
+    };
     table.add(
-        {scene_name(data), data.patches.size(), record.tolerance,
+        {scene_name(data),
+         data.patches.size(),
+         record.tolerance,
          static_cast<double>(data.transfer->bytes()) / static_cast<double>(data.patches.size()),
-         name(kind), errors.size(), sum / static_cast<double>(errors.size()), worst->error,
-         worst->arriving, count_above(errors, limit), groups_above(errors, limit),
-         bound ? Table::Cell(*bound) : Table::Cell(),
-         bound ? Table::Cell(count_above(errors, *bound)) : Table::Cell(), record.error_bound,
-         count_above(errors, record.error_bound), truth_error});
+         name(kind),
+         errors.size(),
+         sum / static_cast<double>(errors.size()),
+         worst->error,
+         worst->arriving,
+         count_above(errors, limit),
+         groups_above(errors, limit),
+         bound,
+         bound.is_null() ? Table::Cell() : Table::Cell(count_above(errors, bound.get<double>())),
+         record.error_bound,
+         count_above(errors, record.error_bound),
+         truth_error,
+         stated("mean"),
+         stated("mean_confidence"),
+         stated("max"),
+         stated("max_confidence")});
   }
 }
 

@@ -14,6 +14,9 @@ struct LightErrorSettings {
   /// The truth by conjugate gradients alone, with neither a dense inverse nor the operator to begin
   /// with: many times slower.
   bool iterate = false;
+  /// Transfer file of the same patches, whose form factors give the truth instead of those that the
+  /// operator was made from; empty: none.
+  std::string truth;
   std::string each;  ///< CSV file for a row of every light; empty: none
 };
 
@@ -24,10 +27,11 @@ Table make_light_error_table();
 Table make_single_light_table();
 
 /// Adds a row for each kind of light: the errors of the operator of `data` under fresh lights,
-/// beside the bounds on record, and to `single` one for each light. The truth is that of the form
-/// factors of `data`, which are to be those that the operator was made from: by conjugate gradients
-/// or, of pairs, a dense inverse of their own, which is many times faster and is itself held
-/// against conjugate gradients.
+/// beside the bounds on record and what the file says of its error against all pairs, and to
+/// `single` one for each light. The truth is that of the form factors of `data`, which are to be
+/// those that the operator was made from, or of another file: by conjugate gradients or, of pairs,
+/// a dense inverse of their own, which is many times faster and is itself held against conjugate
+/// gradients. Throws Error if the other file has other patches.
 void measure_light_errors(const TransferData& data, const LightErrorSettings& settings,
                           Table& table, Table& single);
 

@@ -121,8 +121,12 @@ class TransferBuild {
   void make_operator() {
     if (decided_.operator_kind == OperatorKind::kNoOperator) return;
     const bool links = decided_.exchange_source == ExchangeSource::kLinks;
-    const auto make = links ? make_operator_from_links : make_operator_from_pairs;
-    make(*tracer_, decided_, roles_, data_, report_, clock_);
+    if (links) {
+      make_operator_from_links(*tracer_, model_.shown_patch, decided_, roles_, data_, report_,
+                               clock_);
+    } else {
+      make_operator_from_pairs(*tracer_, decided_, roles_, data_, report_, clock_);
+    }
     data_.emitted_irradiance = irradiance_from_emitters(data_);
   }
 

@@ -45,6 +45,13 @@ std::string settings_json(const BuildSettings& settings, double form_factor_tole
   return json.dump();
 }
 
+nlohmann::json json_of(const SampledError& error) {
+  return {{"mean", error.mean},
+          {"mean_confidence", error.mean_confidence},
+          {"max", error.max},
+          {"max_confidence", error.max_confidence}};
+}
+
 /// Times differ from run to run, so they are not in the file.
 std::string report_json(const BuildReport& report, const std::vector<KindError>& errors) {
   nlohmann::json by_kind = nlohmann::json::object();
@@ -81,6 +88,11 @@ std::string report_json(const BuildReport& report, const std::vector<KindError>&
     json["form_factor_error_max"] = report.form_factor_error->max;
     json["form_factor_error_lights"] = report.form_factor_error->light_count;
     json["form_factor_error_dark_lights"] = report.form_factor_error->dark_count;
+  }
+  if (report.whole_error) {
+    json["whole_error"] = {{"links", json_of(report.whole_error->links)},
+                           {"whole", json_of(report.whole_error->whole)},
+                           {"lights", report.whole_error->light_count}};
   }
   return json.dump();
 }

@@ -22,6 +22,15 @@ void check_tolerances(const BuildRecord& record, const BuildReport& report, bool
         record.error_max, kLargestOverMean * record.tolerance,
         record.error_max / kLargestOverMean));
   }
+  if (record.tolerance > 0 && report.whole_error &&
+      report.whole_error->whole.mean > record.tolerance) {
+    const SampledError &whole = report.whole_error->whole, &links = report.whole_error->links;
+    throw Error(fmt::format(
+        "the light misses the tolerance: with what links are off, the mean error is {:.2g}, the "
+        "tolerance {:.2g}; compression alone is off by {:.2g}, links by {:.2g}; the file is "
+        "written: count it as one of tolerance {:.2g}, or take --form-factors pairs",
+        whole.mean, record.tolerance, record.error_mean, links.mean, whole.mean));
+  }
   if (has_form_factors && report.form_factor_error->mean > report.form_factor_tolerance) {
     throw Error(fmt::format(
         "the compressed form factors miss their tolerance: the mean error is {:.2g}, the tolerance "

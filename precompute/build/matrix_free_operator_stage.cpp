@@ -13,6 +13,7 @@
 #include "precompute/lights/fitting_lights.h"
 #include "precompute/lights/measured_error.h"
 #include "precompute/lights/reference_solution.h"
+#include "precompute/lights/whole_error.h"
 #include "rebounce/error.h"
 #include "transfer/base/area_norm.h"
 
@@ -111,9 +112,9 @@ double form_factor_tolerance(const BuildSettings& decided, const FittedLights& l
 
 }  // namespace
 
-void make_operator_from_links(const RayTracer& tracer, const BuildSettings& decided,
-                              const PatchRoles& roles, TransferData& data, BuildReport& report,
-                              PhaseClock& clock) {
+void make_operator_from_links(const RayTracer& tracer, std::span<const std::uint32_t> shown_patch,
+                              const BuildSettings& decided, const PatchRoles& roles,
+                              TransferData& data, BuildReport& report, PhaseClock& clock) {
   const PatchTable& patches = data.patches;
   const std::uint64_t seed = decided.form_factors.seed;
   const LinkedBuild build =
@@ -126,7 +127,7 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
   FormFactorLinks fewer = clock.run("fewer links", [&](const Progress& part) {
     return fit_links(data.links, patches, kErrorPerLink, part);
   });
-  const FittedLights lights = clock.run("fitting lights", [&](const Progress& part) {
+  FittedLights lights = clock.run("fitting lights", [&](const Progress& part) {
     // The third digit of the radiosities does not matter here.
     const ReferenceSolver solver(
         std::make_shared<const LinkedFormFactors>(fewer, patches.area, patches.centroid), patches);
@@ -146,14 +147,20 @@ void make_operator_from_links(const RayTracer& tracer, const BuildSettings& deci
     return build_matrix_free_transfer(*data.compressed_form_factors, patches,
                                       lights.exitances.view(), settings, part);
   });
+  const ReferenceSolver solver = reference.preconditioned(data.transfer);
+  WholeErrorEstimator whole(data, roles, seed, WholeErrorEstimator::sample_for(patches.size()));
   const std::vector<KindError> errors = clock.run("check", [&](const Progress& part) {
     report.form_factor_error =
         form_factor_error(*data.compressed_form_factors, *links, patches, lights.test_radiosities);
     if (roles.all_are_both()) {
       data.record.solve_residual = transfer_residual(*data.transfer, *links, patches);
     }
-    return measure_error(data, tracer, reference.preconditioned(data.transfer), decided.tolerance,
-                         seed, part);
+    lights = {};  // what follows takes their memory
+    return measure_error(data, tracer, solver, decided.tolerance, seed, part,
+                         [&](const auto&... light) { whole.add(light...); });
+  });
+  report.whole_error = clock.run("check by rays", [&](const Progress& part) {
+    return whole.estimate(shown_patch, tracer, solver, part);
   });
   // The check is the last step that needs all of them.
   data.links = decided.store_links ? std::move(fewer) : FormFactorLinks{};

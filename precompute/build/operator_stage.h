@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cstdint>
+#include <span>
+
 #include "precompute/build/phase_clock.h"
 #include "precompute/inverse/dense_transfer.h"
 #include "rebounce/build_report.h"
@@ -35,9 +38,10 @@ void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& deci
 /// Makes it from data.links, which are kept only on request. F is compressed, and the inverse is
 /// solved for without being stored as a whole (matrix_free_transfer.h). The error is measured
 /// against the links, which neither compression affects. If no tolerance of form factors is set, it
-/// is reduced by the fraction of the light that receivers get.
-void make_operator_from_links(const RayTracer& tracer, const BuildSettings& decided,
-                              const PatchRoles& roles, TransferData& data, BuildReport& report,
-                              PhaseClock& clock);
+/// is reduced by the fraction of the light that receivers get. How far links and operator together
+/// are from exact form factors is estimated by rays; `shown_patch` [t] is that of PatchModel.
+void make_operator_from_links(const RayTracer& tracer, std::span<const std::uint32_t> shown_patch,
+                              const BuildSettings& decided, const PatchRoles& roles,
+                              TransferData& data, BuildReport& report, PhaseClock& clock);
 
 }  // namespace rebounce

@@ -107,8 +107,9 @@ nlohmann::json info_json(const TransferData& data, std::uint64_t file_bytes) {
       {"error_max", record.error_max},
       {"error_bound", record.error_bound},
       {"settings", parse_or_text(data.settings_json)},
-      {"report", parse_or_text(data.report_json)}};
-  for (const char* error : {"form_factor_error_mean", "form_factor_error_max"}) {
+      {"report", parse_or_text(data.report_json)},
+      {"whole_error", nullptr}};
+  for (const char* error : {"form_factor_error_mean", "form_factor_error_max", "whole_error"}) {
     if (info["report"].contains(error)) info[error] = info["report"][error];
   }
   return info;

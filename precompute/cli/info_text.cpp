@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <utility>
 #include <vector>
 
 #include "precompute/lights/error_bound.h"
@@ -167,6 +168,25 @@ std::string error_text(const json& report) {
              std::floor(1 / part_above_bound(static_cast<std::size_t>(std::max(fewest, 1.0)))));
 }
 
+/// The error with that of links, where the operator was made from these.
+std::string whole_error_text(const json& report) {
+  if (!report.contains("whole_error")) return "";
+  const json& errors = report["whole_error"];
+  std::string rows;
+  for (const auto& [key, label] :
+       {std::pair("links", "links alone"), std::pair("whole", "all in all")}) {
+    if (!errors.is_object() || !errors.contains(key)) continue;
+    const json& e = errors[key];
+    rows += fmt::format("  {:<12} {:>9} +- {:<9} {:>9} +- {}\n", label,
+                        percent(number_in(e, "mean")), percent(number_in(e, "mean_confidence")),
+                        percent(number_in(e, "max")), percent(number_in(e, "max_confidence")));
+  }
+  if (rows.empty()) return "";
+  return "\nWith what the links are off that it was made from, under point lights, by rays (mean; "
+         "largest; 95 % confidence):\n" +
+         rows;
+}
+
 /// What the operator was made from; empty where the file does not say.
 std::string origin_text(const json& settings, const json& report) {
   if (!settings.contains("form_factors") || !settings["form_factors"].is_string()) return "";
@@ -245,7 +265,8 @@ std::string info_text(const TransferData& data, std::uint64_t file_bytes, const 
       line("frame", fmt::format("direct light of one lamp that moves {:.2f} ms, product {:.3f} "
                                 "ms, here on {} threads",
                                 times.direct / 1e3, times.product / 1e3, omp_get_max_threads()));
-  return text + error_text(report) + lacking_text(data) + warnings_text(report);
+  return text + error_text(report) + whole_error_text(report) + lacking_text(data) +
+         warnings_text(report);
 }
 
 }  // namespace rebounce::cli

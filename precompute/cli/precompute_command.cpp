@@ -106,6 +106,13 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
       operator_name(data.transfer->kind()), static_cast<double>(data.transfer->bytes()) / (1 << 20),
       static_cast<double>(data.transfer->bytes()) / static_cast<double>(report.patch_count),
       data.record.solve_residual, data.record.error_mean, data.record.error_max);
+  if (report.whole_error) {
+    const SampledError &whole = report.whole_error->whole, &links = report.whole_error->links;
+    fmt::print(
+        "with what links are off: {:.1e} +- {:.0e} mean, {:.1e} +- {:.0e} max (links alone {:.1e} "
+        "mean, {:.1e} max)\n",
+        whole.mean, whole.mean_confidence, whole.max, whole.max_confidence, links.mean, links.max);
+  }
   if (const PatchRoles& roles = data.transfer->roles(); !roles.all_are_both()) {
     fmt::print("receivers: {} patches, sources: {}\n",
                roles.count(PatchRoles::kReceiver, report.patch_count),

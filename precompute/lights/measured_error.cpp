@@ -36,8 +36,8 @@ KindError summary(LightKind kind, std::size_t light_count, const std::vector<dou
           error_bound(errors)};
 }
 
-/// Returns the errors of lights, without those from which nothing arrives.
-using ErrorsOf = std::function<std::vector<double>(const Exitances&, const Progress&)>;
+/// Returns the errors of lights of a kind, without those from which nothing arrives.
+using ErrorsOf = std::function<std::vector<double>(LightKind, const Exitances&, const Progress&)>;
 
 std::vector<KindError> measure(const TransferData& data, const RayTracer& tracer, int light_count,
                                std::uint64_t seed, const ErrorsOf& errors_of,
@@ -51,7 +51,7 @@ std::vector<KindError> measure(const TransferData& data, const RayTracer& tracer
     const LightKind kind = kLightKinds[k];
     const Exitances lights =
         random_initial_exitances(data, tracer, kind, light_count, seed, data.transfer->roles());
-    const std::vector<double> errors = errors_of(lights, part);
+    const std::vector<double> errors = errors_of(kind, lights, part);
     if (!errors.empty()) result.push_back(summary(kind, lights.size(), errors));
   }
   return result;
@@ -61,7 +61,8 @@ std::vector<KindError> measure(const TransferData& data, const RayTracer& tracer
 
 std::vector<LightError> light_errors(const TransferData& data,
                                      std::span<const std::vector<Float3>> lights,
-                                     const TruthOf& truth_of, const Progress& progress) {
+                                     const TruthOf& truth_of, const Progress& progress,
+                                     const LightListener& on_light) {
   const std::vector<float>& area = data.patches.area;
   std::vector<Float3> indirect_irradiance(data.patches.size());
   std::vector<float> workspace(data.transfer->workspace_size());
@@ -75,12 +76,13 @@ std::vector<LightError> light_errors(const TransferData& data,
     auto truths = truth_of(some);
     for (std::size_t k = 0; k < some.size(); ++k) {
       if (arrives_nowhere(truths[k], some[k], area)) continue;
+      data.transfer->apply(some[k], indirect_irradiance, workspace);
+      if (on_light) on_light(some[k], truths[k], indirect_irradiance);
       const double all = area_norm(truths[k], area);
       data.transfer->roles().keep(PatchRoles::kReceiver, truths[k]);
       const double seen = area_norm(truths[k], area);
       received.add(seen, all);
       errors.push_back({.arriving = seen / area_norm(some[k], area), .light = done + k});
-      data.transfer->apply(some[k], indirect_irradiance, workspace);
       results.push_back(indirect_irradiance);
       arrived.push_back(std::move(truths[k]));
     }
@@ -101,7 +103,7 @@ std::vector<KindError> measure_error(const TransferData& data, const RayTracer& 
   if (exact == nullptr) {
     return measure_error(data, tracer, ReferenceSolver(data), 0, seed, progress);
   }
-  const auto errors_of = [&](const Exitances& lights, const Progress&) {
+  const auto errors_of = [&](LightKind, const Exitances& lights, const Progress&) {
     return ReferenceLighting(DenseMatrix(*exact, data.transfer->roles()), lights)
         .errors(*data.transfer);
   };
@@ -110,14 +112,16 @@ std::vector<KindError> measure_error(const TransferData& data, const RayTracer& 
 
 std::vector<KindError> measure_error(const TransferData& data, const RayTracer& tracer,
                                      const ReferenceSolver& reference, double tolerance,
-                                     std::uint64_t seed, const Progress& progress) {
-  const auto errors_of = [&](const Exitances& lights, const Progress& part) {
+                                     std::uint64_t seed, const Progress& progress,
+                                     const LightListener& on_point_light) {
+  const auto errors_of = [&](LightKind kind, const Exitances& lights, const Progress& part) {
     const auto truth_of = [&](std::span<const std::vector<Float3>> some) {
       return reference.indirect_irradiances(some, kReferenceResidual,
                                             kResidualOfTolerance * tolerance);
     };
     std::vector<double> errors;
-    for (const LightError& light : light_errors(data, lights, truth_of, part)) {
+    const LightListener& on_light = kind == LightKind::kPoint ? on_point_light : LightListener();
+    for (const LightError& light : light_errors(data, lights, truth_of, part, on_light)) {
       errors.push_back(light.error);
     }
     return errors;

@@ -37,13 +37,20 @@ struct LightError {
 using TruthOf =
     std::function<std::vector<std::vector<Float3>>(std::span<const std::vector<Float3>>)>;
 
+/// Called for each light that has an error, in order: its initial exitance, the reference on all
+/// patches, and what data.transfer gives, all [n] in lx.
+using LightListener =
+    std::function<void(std::span<const Float3> initial_exitance, std::span<const Float3> truth,
+                       std::span<const Float3> result)>;
+
 /// The errors of data.transfer under `lights`, each cut to what sources emit, against `truth_of`.
 /// It is called for ReferenceSolver::kBatchLights lights at a time. The errors keep the order of
 /// the lights; lights from which nothing arrives (arrives_nowhere) are left out. Throws Cancelled
 /// if asked to stop.
 std::vector<LightError> light_errors(const TransferData& data,
                                      std::span<const std::vector<Float3>> lights,
-                                     const TruthOf& truth_of, const Progress& progress = {});
+                                     const TruthOf& truth_of, const Progress& progress = {},
+                                     const LightListener& on_light = {});
 
 /// Measures data.transfer under random lights of every kind that the scene has: light of its
 /// sources, at its receivers.
@@ -59,9 +66,11 @@ std::vector<KindError> measure_error(const TransferData& data, const RayTracer& 
 
 /// Measures an operator of `tolerance` that was made from links. `reference` solves with these
 /// links, so exactly that no error changes by a thousandth; 256 lights of a kind. With a tolerance
-/// of 0 this measures rounding errors, with 16 lights of a kind.
+/// of 0 this measures rounding errors, with 16 lights of a kind. `on_point_light` is called for
+/// point lights.
 std::vector<KindError> measure_error(const TransferData& data, const RayTracer& tracer,
                                      const ReferenceSolver& reference, double tolerance,
-                                     std::uint64_t seed, const Progress& progress = {});
+                                     std::uint64_t seed, const Progress& progress = {},
+                                     const LightListener& on_point_light = {});
 
 }  // namespace rebounce

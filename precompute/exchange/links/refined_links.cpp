@@ -18,8 +18,8 @@ std::vector<Escape> measure_escapes(const PatchModel& model, const RayTracer& tr
     EscapeScratch scratch;
 #pragma omp for schedule(dynamic, 16)
     for (std::uint32_t i = 0; i < escape.size(); ++i) {
-      escape[i] = measure_escape(model, triangles[i], i, tracer, settings.hemisphere_rays,
-                                 settings.seed, scratch);
+      escape[i] = measure_escape(model.mesh, model.shown_patch, triangles[i], i, tracer,
+                                 settings.hemisphere_rays, settings.seed, scratch);
     }
   }
   return escape;

@@ -83,13 +83,14 @@ void make_escape_rays(const PatchSurface& surface, float offset, std::uint64_t b
 
 }  // namespace
 
-Escape measure_escape(const PatchModel& model, std::span<const std::uint32_t> triangles,
-                      std::uint32_t patch, const RayTracer& tracer, int ray_count,
-                      std::uint64_t seed, EscapeScratch& scratch) {
+Escape measure_escape(const DisplayMesh& mesh, std::span<const std::uint32_t> shown_patch,
+                      std::span<const std::uint32_t> triangles, std::uint32_t patch,
+                      const RayTracer& tracer, int ray_count, std::uint64_t seed,
+                      EscapeScratch& scratch) {
   scratch.rays.resize(ray_count);
   scratch.hits.resize(ray_count);
   scratch.met.resize(ray_count);
-  make_escape_rays(PatchSurface(model.mesh, triangles), tracer.offset_distance(),
+  make_escape_rays(PatchSurface(mesh, triangles), tracer.offset_distance(),
                    mix_bits(seed ^ (patch * 2654435761ULL)), scratch.rays);
   tracer.intersect(scratch.rays, scratch.hits);
 
@@ -97,8 +98,8 @@ Escape measure_escape(const PatchModel& model, std::span<const std::uint32_t> tr
   std::array<int, kSkyCellCount> count{};
   for (std::size_t k = 0; k < scratch.hits.size(); ++k) {
     Hit& hit = scratch.hits[k];
-    prefer_lit_side(model.mesh, tracer, scratch.rays[k], hit, scratch.coincidence);
-    scratch.met[k] = patch_at(model.mesh, model.shown_patch, hit);
+    prefer_lit_side(mesh, tracer, scratch.rays[k], hit, scratch.coincidence);
+    scratch.met[k] = patch_at(mesh, shown_patch, hit);
     if (hit.triangle == kNone) {
       ++sky;
       ++count[sky_cell(scratch.rays[k].direction)];

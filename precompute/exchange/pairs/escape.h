@@ -32,10 +32,12 @@ struct EscapeScratch {
 };
 
 /// Measures the escape of patch `patch` by `ray_count` cosine-distributed rays from points spread
-/// over its `triangles`, by Sobol's sequence. prefer_lit_side decides which patch a ray meets.
-Escape measure_escape(const PatchModel& model, std::span<const std::uint32_t> triangles,
-                      std::uint32_t patch, const RayTracer& tracer, int ray_count,
-                      std::uint64_t seed, EscapeScratch& scratch);
+/// over its `triangles`, by Sobol's sequence. `shown_patch` is that of PatchModel; prefer_lit_side
+/// decides which patch a ray meets.
+Escape measure_escape(const DisplayMesh& mesh, std::span<const std::uint32_t> shown_patch,
+                      std::span<const std::uint32_t> triangles, std::uint32_t patch,
+                      const RayTracer& tracer, int ray_count, std::uint64_t seed,
+                      EscapeScratch& scratch);
 
 /// The escaped light of all patches: 1 minus `row_sum` [n] of F, shared among sky and absorption in
 /// the proportions measured, `escape` [n].

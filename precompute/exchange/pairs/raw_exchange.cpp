@@ -159,8 +159,9 @@ class RawExchangeBuilder {
     for_each_patch(
         patches,
         [&](std::uint32_t i, Scratch& scratch) {
-          escape[i] = measure_escape(model_, patch_triangles_[i], i, tracer_,
-                                     settings_.hemisphere_rays, settings_.seed, scratch.escape);
+          escape[i] =
+              measure_escape(model_.mesh, model_.shown_patch, patch_triangles_[i], i, tracer_,
+                             settings_.hemisphere_rays, settings_.seed, scratch.escape);
           met[i] = scratch.counter.count(n, scratch.escape.met);
         },
         part);

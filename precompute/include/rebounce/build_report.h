@@ -30,6 +30,21 @@ struct FormFactorError {
   int dark_count = 0;   ///< lights from which nothing arrives
 };
 
+/// An estimate of errors by rays. With 95 % confidence the mean lies within `mean_confidence` of
+/// `mean`, and the error of the light that errs most within `max_confidence` of `max`.
+struct SampledError {
+  double mean = 0, mean_confidence = 0;
+  double max = 0, max_confidence = 0;
+};
+
+/// Relative area-weighted L2 errors of the indirect irradiance under point lights against exact
+/// form factors, where the operator is made from links.
+struct WholeError {
+  SampledError links;  ///< of the light that the links give
+  SampledError whole;  ///< of the operator: links and compression
+  int light_count = 0;
+};
+
 /// What the expensive part, or what is left of it, will take.
 struct CostEstimate {
   std::size_t patch_count = 0;
@@ -60,7 +75,8 @@ struct BuildReport {
   /// Of the compressed form factors: relative area-weighted L2 error of F B under lights that they
   /// were not fitted to.
   std::optional<FormFactorError> form_factor_error;
-  double form_factor_tolerance = 0;  ///< that they were compressed to
+  std::optional<WholeError> whole_error;  ///< of an operator from links
+  double form_factor_tolerance = 0;       ///< that they were compressed to
   CostEstimate estimate;
   std::optional<CostEstimate> estimate_after_links;  ///< of what is left then
 };

@@ -79,12 +79,42 @@ TEST_F(PrecomputeCommand, LinksHaveNoFormFactorsOfPairs) {
   expect_refused({"precompute", kScene, "--patches", "100", "--form-factors", "links",
                   "--store-form-factors", "-o", path("x.safetensors")},
                  "--compress-form-factors");
-  const std::string file = precompute("box.safetensors", {"--form-factors", "links"});
+  const double tolerance = 0.03;
+  const std::string file = precompute(
+      "box.safetensors", {"--form-factors", "links", "--tolerance", std::to_string(tolerance)});
   const json info = summary_of({"info", file});
   EXPECT_EQ(info["form_factors"], "none");
   EXPECT_EQ(info["compressed_form_factor_bytes"], 0);
-  EXPECT_EQ(info["settings"]["form_factor_tolerance"], kDefaultTolerance / 5);
-  EXPECT_LE(info["error_mean"].get<double>(), kDefaultTolerance);
+  EXPECT_EQ(info["settings"]["form_factor_tolerance"], tolerance / 5);
+  EXPECT_LE(info["error_mean"].get<double>(), tolerance);
+}
+
+TEST_F(PrecomputeCommand, LinksThatAreOffCountTowardTheTolerance) {
+  const double tolerance = 0.02;
+  const Words words = {"precompute",
+                       kScene,
+                       "--patches",
+                       "300",
+                       "--form-factors",
+                       "links",
+                       "--link-epsilon",
+                       "0.05",
+                       "--tolerance",
+                       std::to_string(tolerance),
+                       "-o",
+                       path("box.safetensors"),
+                       "--quiet"};
+  expect_failure(words, "with what links are off");
+  const json info = summary_of({"info", path("box.safetensors")});
+  EXPECT_LE(info["error_mean"].get<double>(), tolerance) << "compression alone keeps it";
+  const json &whole = info["whole_error"]["whole"], &links = info["whole_error"]["links"];
+  EXPECT_GT(whole["mean"].get<double>(), tolerance);
+  EXPECT_GT(links["mean"].get<double>(), tolerance / 2);
+  EXPECT_GT(whole["max"], whole["mean"]);
+  const std::string said = run({"info", path("box.safetensors")}).out;
+  for (const char* part : {"With what the links are off", "links alone", "all in all"}) {
+    EXPECT_NE(said.find(part), std::string::npos) << part << " in\n" << said;
+  }
 }
 
 TEST_F(PrecomputeCommand, RecordsTheSettingsThatApply) {

@@ -21,7 +21,7 @@ std::vector<std::vector<MetPatch>> met_by_all(const PatchModel& model) {
   EscapeScratch scratch;
   MetPatchCounter counter;
   for (std::uint32_t i = 0; i < model.patches.size(); ++i) {
-    measure_escape(model, triangles[i], i, tracer, kRays, 1, scratch);
+    measure_escape(model.mesh, model.shown_patch, triangles[i], i, tracer, kRays, 1, scratch);
     met.push_back(counter.count(model.patches.size(), scratch.met));
   }
   return met;

@@ -1,0 +1,263 @@
+#include "precompute/lights/whole_error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "precompute/base/parallel_progress.h"
+#include "precompute/exchange/pairs/escape.h"
+#include "precompute/exchange/pairs/hemisphere_exchange.h"
+#include "runtime/rays/patch_points.h"
+#include "runtime/rays/sampling.h"
+#include "transfer/base/area_norm.h"
+#include "transfer/base/reflection.h"
+
+namespace rebounce {
+namespace {
+
+constexpr std::size_t kGroups = WholeErrorEstimator::kGroups;
+
+// Residual of what spreads the errors, relative to the reflected light: their third digit does not
+// matter.
+constexpr double kSpreadResidual = 1e-2;
+
+// The quantile at 97.5 % of Student's distribution with kGroups - 1 = 3 degrees of freedom.
+constexpr double kStudent = 3.182;
+
+// Rays of a group, and of a patch of it at most (lab/111).
+constexpr std::size_t kRaysOfGroup = 1 << 23, kMostRays = 4096;
+
+// The lights whose errors are spread together, as many as are solved for together.
+constexpr std::size_t kLightsAtOnce = ReferenceSolver::kBatchLights / kGroups;
+
+// Rays take this part of the time of an estimate.
+constexpr double kTracingPart = 0.7;
+
+/// An estimate from all groups, and from all but one.
+struct Replicates {
+  double all = 0;
+  std::array<double, kGroups> without{};
+
+  void add(const Replicates& other, double weight) {
+    all += weight * other.all;
+    for (std::size_t g = 0; g < kGroups; ++g) without[g] += weight * other.without[g];
+  }
+
+  double confidence() const {
+    double mean = 0, squares = 0;
+    for (const double w : without) mean += w / kGroups;
+    for (const double w : without) squares += (w - mean) * (w - mean);
+    return kStudent * std::sqrt(squares * (kGroups - 1) / kGroups);
+  }
+};
+
+/// The root of the mean of `product`(g, h) over the ordered pairs of different groups, of all of
+/// them and without each.
+template <typename Product>
+Replicates root_of_pairs(const Product& product) {
+  const auto root = [&](std::size_t without) {
+    double sum = 0;
+    int count = 0;
+    for (std::size_t g = 0; g < kGroups; ++g) {
+      for (std::size_t h = 0; h < kGroups; ++h) {
+        if (g == h || g == without || h == without) continue;
+        sum += product(g, h);
+        ++count;
+      }
+    }
+    return std::sqrt(std::max(0.0, sum / count));
+  };
+  Replicates result{.all = root(kGroups)};
+  for (std::size_t g = 0; g < kGroups; ++g) result.without[g] = root(g);
+  return result;
+}
+
+/// The error of each light, relative to `reference`(light).
+template <typename Reference>
+SampledError error_over_lights(const std::vector<Replicates>& lights, const Reference& reference) {
+  Replicates sum, largest;
+  for (std::size_t k = 0; k < lights.size(); ++k) {
+    Replicates relative;
+    relative.add(lights[k], 1 / reference(k));
+    sum.add(relative, 1 / static_cast<double>(lights.size()));
+    if (relative.all > largest.all) largest = relative;
+  }
+  return {sum.all, sum.confidence(), largest.all, largest.confidence()};
+}
+
+/// `count` of `all` numbers, one in each of as many equal runs.
+std::vector<std::uint32_t> spread_choice(std::size_t count, std::size_t all, std::uint64_t bits) {
+  const double start = unit_square(bits).x;
+  std::vector<std::uint32_t> chosen;
+  for (std::size_t k = 0; k < count; ++k) {
+    const double place = (static_cast<double>(k) + start) / static_cast<double>(count);
+    chosen.push_back(static_cast<std::uint32_t>(place * static_cast<double>(all)));
+  }
+  return chosen;
+}
+
+double area_product(std::span<const Float3> a, std::span<const Float3> b,
+                    std::span<const float> area) {
+  double sum = 0;
+  for (std::size_t i = 0; i < area.size(); ++i) {
+    double product = 0;
+    for (int c = 0; c < kChannelCount; ++c) product += static_cast<double>(a[i][c]) * b[i][c];
+    sum += area[i] * product;
+  }
+  return sum;
+}
+
+void add_to(std::span<Float3> sum, std::span<const Float3> values, float weight = 1) {
+  for (std::size_t i = 0; i < sum.size(); ++i) {
+    for (int c = 0; c < kChannelCount; ++c) sum[i][c] += weight * values[i][c];
+  }
+}
+
+}  // namespace
+
+WholeErrorEstimator::WholeErrorEstimator(const TransferData& data, const PatchRoles& roles,
+                                         std::uint64_t seed, const Sample& sample)
+    : data_(data), roles_(roles), seed_(mix_bits(seed)), ray_count_(sample.ray_count) {
+  const std::size_t n = data.patches.size();
+  for (std::size_t g = 0; g < kGroups; ++g) {
+    patch_[g] = spread_choice(std::min(n, sample.patch_count), n, mix_bits(seed_ + g));
+    residual_[g].resize(patch_[g].size());
+  }
+}
+
+WholeErrorEstimator::Sample WholeErrorEstimator::sample_for(std::size_t patch_count) {
+  Sample sample;
+  const std::size_t rays = kRaysOfGroup / std::min(patch_count, sample.patch_count);
+  sample.ray_count = static_cast<int>(std::min<std::size_t>(rays, kMostRays));
+  return sample;
+}
+
+void WholeErrorEstimator::add(std::span<const Float3> initial_exitance,
+                              std::span<const Float3> truth, std::span<const Float3> result) {
+  const PatchTable& patches = data_.patches;
+  std::vector<Float3> received(truth.begin(), truth.end());
+  roles_.keep(PatchRoles::kReceiver, received);
+  received_.add(area_norm(received, patches.area), area_norm(truth, patches.area));
+  std::vector<Float3>& compression = compression_.emplace_back(result.begin(), result.end());
+  std::vector<Float3>& radiosity = radiosity_.emplace_back(truth.begin(), truth.end());
+  reflect(patches.reflectance, radiosity);
+  add_to(radiosity, initial_exitance);
+  for (std::size_t i = 0; i < patches.size(); ++i) {
+    for (int c = 0; c < kChannelCount; ++c) compression[i][c] -= received[i][c];
+  }
+  for (std::size_t g = 0; g < kGroups; ++g) {
+    for (std::size_t k = 0; k < patch_[g].size(); ++k) {
+      const auto& [r, green, b] = truth[patch_[g][k]];
+      residual_[g][k].push_back({-r, -green, -b});
+    }
+  }
+}
+
+/// Adds the mean of the radiosity where rays end to what `residual_` holds.
+void WholeErrorEstimator::trace(std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
+                                const Progress& progress) {
+  const std::size_t n = data_.patches.size(), lights = radiosity_.size();
+  std::vector<Float3> by_patch(n * lights);
+  for (std::size_t l = 0; l < lights; ++l) {
+    for (std::size_t i = 0; i < n; ++i) by_patch[i * lights + l] = radiosity_[l][i];
+    std::vector<Float3>().swap(radiosity_[l]);
+  }
+  const PatchTriangles triangles(data_.mesh.triangle_patch, n);
+  const std::size_t rows = patch_[0].size();
+  ParallelProgress loop(progress, kGroups * rows);
+#pragma omp parallel
+  {
+    EscapeScratch scratch;
+    MetPatchCounter counter;
+    std::vector<Float3> sum;
+#pragma omp for schedule(dynamic, 16)
+    for (std::size_t k = 0; k < kGroups * rows; ++k) {
+      if (loop.stopped()) continue;
+      const std::size_t group = k / rows, row = k % rows;
+      const std::uint32_t i = patch_[group][row];
+      measure_escape(data_.mesh, shown_patch, triangles[i], i, tracer, ray_count_,
+                     mix_bits(seed_ + kGroups + group), scratch);
+      sum.assign(lights, Float3{0, 0, 0});
+      for (const MetPatch& met : counter.count(n, scratch.met)) {
+        add_to(sum, std::span(by_patch).subspan(met.patch * lights, lights),
+               static_cast<float>(met.count) / static_cast<float>(ray_count_));
+      }
+      add_to(residual_[group][row], sum);
+      loop.advance();
+    }
+  }
+  loop.finish();
+}
+
+/// What a group says of the residual, 0 at patches that are not in it.
+std::vector<Float3> WholeErrorEstimator::residual(std::size_t group, std::size_t light) const {
+  const std::size_t n = data_.patches.size(), count = patch_[group].size();
+  const float weight = static_cast<float>(n) / static_cast<float>(count);
+  std::vector<Float3> result(n, Float3{0, 0, 0});
+  for (std::size_t k = 0; k < count; ++k) {
+    const auto& [r, g, b] = residual_[group][k][light];
+    result[patch_[group][k]] = {weight * r, weight * g, weight * b};
+  }
+  return result;
+}
+
+/// What the groups say that the light of the links lacks, P r = r + Y rho r, into `missing_`.
+void WholeErrorEstimator::spread(const ReferenceSolver& reference, std::size_t first,
+                                 std::size_t count) {
+  std::vector<std::vector<Float3>> reflected;
+  missing_.clear();
+  for (std::size_t l = first; l < first + count; ++l) {
+    for (std::size_t g = 0; g < kGroups; ++g) {
+      missing_.push_back(residual(g, l));
+      reflect(data_.patches.reflectance, reflected.emplace_back(missing_.back()));
+    }
+  }
+  const auto transferred =
+      reference.indirect_irradiances(reflected, kSpreadResidual, kSpreadResidual);
+  for (std::size_t k = 0; k < missing_.size(); ++k) {
+    add_to(missing_[k], transferred[k]);
+    roles_.keep(PatchRoles::kReceiver, missing_[k]);
+  }
+}
+
+WholeErrorEstimator::Products WholeErrorEstimator::products(std::size_t light) const {
+  const auto missing = std::span(missing_).subspan(light % kLightsAtOnce * kGroups, kGroups);
+  const std::vector<float>& area = data_.patches.area;
+  const std::vector<Float3>& compression = compression_[light];
+  Products result;
+  result.of_compression = area_product(compression, compression, area);
+  for (std::size_t g = 0; g < kGroups; ++g) {
+    result.with_compression[g] = area_product(compression, missing[g], area);
+    for (std::size_t h = 0; h < g; ++h) {
+      const double both = area_product(missing[g], missing[h], area);
+      result.of_groups[g][h] = result.of_groups[h][g] = both;
+    }
+  }
+  return result;
+}
+
+WholeError WholeErrorEstimator::estimate(std::span<const std::uint32_t> shown_patch,
+                                         const RayTracer& tracer, const ReferenceSolver& reference,
+                                         const Progress& progress) {
+  const std::size_t lights = compression_.size();
+  if (lights == 0) return {};
+  trace(shown_patch, tracer, part_of(progress, 0, kTracingPart));
+  std::vector<Replicates> of_links, of_whole;
+  for (std::size_t l = 0; l < lights; ++l) {
+    if (l % kLightsAtOnce == 0) {
+      report_progress(progress, kTracingPart + (1 - kTracingPart) * l / lights);
+      spread(reference, l, std::min(kLightsAtOnce, lights - l));
+    }
+    const Products p = products(l);
+    of_links.push_back(
+        root_of_pairs([&](std::size_t g, std::size_t h) { return p.of_groups[g][h]; }));
+    of_whole.push_back(root_of_pairs([&](std::size_t g, std::size_t h) {
+      return p.of_compression - p.with_compression[g] - p.with_compression[h] + p.of_groups[g][h];
+    }));
+  }
+  const auto arrived = [&](std::size_t k) { return received_.reference(k); };
+  return {error_over_lights(of_links, arrived), error_over_lights(of_whole, arrived),
+          static_cast<int>(lights)};
+}
+
+}  // namespace rebounce
