@@ -8,7 +8,6 @@
 #include "precompute/base/process_memory.h"
 #include "precompute/build/operator_stage.h"
 #include "precompute/compression/matrix_free_plan.h"
-#include "precompute/exchange/links/link_refinement.h"
 #include "precompute/exchange/pairs/closure.h"
 #include "precompute/exchange/pairs/form_factors.h"
 #include "rebounce/error.h"

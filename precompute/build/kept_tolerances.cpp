@@ -8,7 +8,7 @@
 namespace rebounce {
 
 double finer_tolerance(const BuildRecord& record) {
-  // Below half of the tolerance operators get too large for one lamp; lab/116.
+  // Below half of the tolerance operators get too large for one lamp; lab/115.
   constexpr double kMargin = 0.9, kLeastPart = 0.5;
   const double limit = kLargestOverMean * record.tolerance;
   if (record.error_max <= limit) return 0;
