@@ -7,6 +7,15 @@
 
 namespace rebounce {
 
+double finer_tolerance(const BuildRecord& record) {
+  // Below half of the tolerance operators get too large for one lamp; lab/115.
+  constexpr double kMargin = 0.9, kLeastPart = 0.5;
+  const double limit = kLargestOverMean * record.tolerance;
+  if (record.error_max <= limit) return 0;
+  const double part = kMargin * limit / record.error_max;
+  return part >= kLeastPart ? part * record.tolerance : 0;
+}
+
 void check_tolerances(const BuildRecord& record, const BuildReport& report, bool has_form_factors) {
   if (record.tolerance > 0 && record.error_mean > record.tolerance) {
     throw Error(fmt::format(

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "precompute/build/build_record.h"
+#include "precompute/build/kept_tolerances.h"
 #include "precompute/compression/form_factor_compression.h"
 #include "precompute/compression/hierarchical_transfer.h"
 #include "precompute/compression/low_rank_transfer.h"
@@ -60,14 +61,15 @@ void compress_form_factors_of(TransferData& data, const TransferOperator& transf
 }
 
 /// Measures the error of the operator against `exact` or, if that is null, against an iterative
-/// solution.
+/// solution. `seed`: of the lights.
 void check_operator(TransferData& data, const RayTracer& tracer, const DenseOperator* exact,
-                    const BuildSettings& decided, const BuildReport& report, PhaseClock& clock) {
+                    const BuildSettings& decided, std::uint64_t seed, const BuildReport& report,
+                    PhaseClock& clock) {
   const std::vector<KindError> errors = clock.run("check", [&](const Progress& part) {
     if (data.transfer->roles().all_are_both()) {
       data.record.solve_residual = transfer_residual(*data.transfer, data.exchange, data.patches);
     }
-    return measure_error(data, tracer, exact, decided.form_factors.seed, part);
+    return measure_error(data, tracer, exact, seed, part);
   });
   record_build(decided, report, errors, data);
 }
@@ -97,7 +99,17 @@ void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& deci
       return true;
     });
   }
-  check_operator(data, tracer, compressed ? dense.get() : nullptr, decided, report, clock);
+  const std::uint64_t seed = decided.form_factors.seed;
+  check_operator(data, tracer, compressed ? dense.get() : nullptr, decided, seed, report, clock);
+  const double finer = finer_tolerance(data.record);
+  if (finer == 0) return;
+  BuildSettings again = decided;
+  again.tolerance = finer;
+  data.transfer = clock.run("compression again", [&](const Progress& part) {
+    return compress(*dense, data, tracer, again, roles, part);
+  });
+  // Lights that the first check has not seen.
+  check_operator(data, tracer, dense.get(), decided, seed + 1, report, clock);
 }
 
 }  // namespace rebounce

@@ -33,6 +33,13 @@ TEST(KeptTolerances, ALampAboveThreeTimesTheToleranceIsSaid) {
                      "the largest error of the check is 0.015, three times the tolerance is 0.015");
 }
 
+TEST(KeptTolerances, AFinerOperatorIsTriedWhereItHelps) {
+  EXPECT_EQ(finer_tolerance(record_of(0.005, 0.004, 0.0149)), 0);
+  EXPECT_NEAR(finer_tolerance(record_of(0.005, 0.004, 0.018)), 0.00375, 1e-9);
+  EXPECT_EQ(finer_tolerance(record_of(0.005, 0.004, 0.06)), 0);
+  EXPECT_EQ(finer_tolerance(record_of(0, 0, 0)), 0);
+}
+
 TEST(KeptTolerances, FormFactorsAboveTheirsAreSaid) {
   BuildReport report;
   report.form_factor_tolerance = 0.001;

@@ -108,6 +108,89 @@ TEST(LampKinds, LightBlocksOfPointsAsTheyDoEachPoint) {
   EXPECT_GT(dark, 50);
 }
 
+TEST(LampKinds, SurfacesLightBlocksOfPointsAsTheyDoEachPoint) {
+  constexpr unsigned kSeed = 11;
+  SCOPED_TRACE(kSeed);
+  std::mt19937 engine(kSeed);
+  std::uniform_real_distribution<float> place(-1, 2), one(0, 1);
+  for (const LampKind* kind : lamp_kinds()) {
+    if (kind->surface == nullptr) continue;
+    SCOPED_TRACE(kind->name);
+    int whole = 0, cut = 0, dark = 0;
+    for (int round = 0; round < 20; ++round) {
+      const PreparedLight lamp(good_lamp(*kind));
+      PatchPointBlock points{};
+      for (std::size_t k = 0; k < PatchPointBlock::kSize; ++k) {
+        const glm::vec3 normal = glm::normalize(glm::vec3(place(engine), place(engine), 0.1F));
+        for (int axis = 0; axis < 3; ++axis) {
+          points.position[axis][k] = place(engine);
+          points.normal[axis][k] = normal[axis];
+        }
+      }
+      for (std::size_t part = 0; part < PatchPointBlock::kSize / UnitLightBlock::kPart; ++part) {
+        PartValues irradiance, u, v;
+        for (std::size_t e = 0; e < UnitLightBlock::kPart; ++e) {
+          u[e] = one(engine);
+          v[e] = one(engine);
+        }
+        lamp.unoccluded_irradiance(points, part, irradiance);
+        PlacesOfPart places;
+        kind->surface->places_of_part(lamp, points, part, u, v, places);
+        for (std::size_t e = 0; e < UnitLightBlock::kPart; ++e) {
+          const std::size_t k = part * UnitLightBlock::kPart + e;
+          const glm::vec3 at = points.at(k), normal = points.normal_at(k);
+          const float expected = lamp.unoccluded_irradiance(at, normal);
+          EXPECT_NEAR(irradiance[e], expected, 2e-5F * expected + 1e-7F);
+          const bool above = glm::dot(lamp.highest_point(-normal) - at, normal) > 0;
+          ++(expected == 0 ? dark : above ? whole : cut);
+          const glm::vec2 square(u[e], v[e]);
+          UnitLight light;
+          lamp.evaluate_places(at, {&square, 1}, {&light, 1});
+          if (light.illuminance == 0) continue;
+          const glm::vec3 path(places.path[0][e], places.path[1][e], places.path[2][e]);
+          EXPECT_LT(glm::distance(path, light.direction * light.distance), 1e-5F);
+          EXPECT_EQ(places.weight[e] > 0, glm::dot(path, normal) > 0);
+        }
+      }
+    }
+    EXPECT_GT(whole, 100);
+    EXPECT_GT(cut, 20);
+    EXPECT_GT(dark, 100);
+  }
+}
+
+TEST(LampKinds, PlacesWeighWhatTheyAddToTheLight) {
+  constexpr unsigned kSeed = 12;
+  SCOPED_TRACE(kSeed);
+  std::mt19937 engine(kSeed);
+  std::uniform_real_distribution<float> one(0, 1);
+  for (const LampKind* kind : lamp_kinds()) {
+    if (kind->surface == nullptr) continue;
+    const PreparedLight lamp(good_lamp(*kind));
+    // The same point in all lanes, so that all weights have one unit.
+    PatchPointBlock points{};
+    const glm::vec3 normal = glm::normalize(glm::vec3(0.3F, 1, 0.2F));
+    for (int axis = 0; axis < 3; ++axis) points.normal[axis].fill(normal[axis]);
+    PartValues u, v;
+    for (std::size_t e = 0; e < u.size(); ++e) {
+      u[e] = one(engine);
+      v[e] = one(engine);
+    }
+    PlacesOfPart places;
+    kind->surface->places_of_part(lamp, points, 0, u, v, places);
+    float unit = 0;
+    for (std::size_t e = 0; e < u.size(); ++e) {
+      const glm::vec2 square(u[e], v[e]);
+      UnitLight light;
+      lamp.evaluate_places(points.at(e), {&square, 1}, {&light, 1});
+      const float added = light.illuminance * glm::dot(light.direction, normal);
+      if (e == 0) unit = places.weight[0] / added;
+      EXPECT_NEAR(places.weight[e], unit * added, 1e-5F * unit * added) << kind->name;
+    }
+    EXPECT_GT(unit, 0) << kind->name;
+  }
+}
+
 /// The irradiance at the origin: the mean over many places of the lamp.
 double mean_of_places(const PreparedLight& lamp, const glm::vec3& normal) {
   constexpr int kSide = 200;

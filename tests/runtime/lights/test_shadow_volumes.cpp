@@ -146,6 +146,65 @@ TEST(ShadowVolumes, BoxesMeetWhatTheirPointsAreIn) {
   EXPECT_GT(apart, 100);
 }
 
+TEST(ShadowKernels, HidePlacesBehindPieces) {
+  SCOPED_TRACE(kSeed);
+  std::mt19937 engine(kSeed);
+  constexpr std::size_t kPlaces = 3, kLanes = kShadowLanes;
+  constexpr VolumeNumber kPieces = 2;
+  const std::array<VolumeNumber, kPieces> numbers = {1, 0};
+  // All points are inside of these.
+  std::array<VolumePlanes, kPieces> everywhere{};
+  for (VolumePlanes& volume : everywhere) {
+    for (VolumePlanes::Plane& plane : volume.plane) plane = {0, 0, 0, -1};
+  }
+  int crossed = 0, free = 0;
+  for (int round = 0; round < 300; ++round) {
+    const Occluders occluders{.piece = {any_occluder(engine, true), any_occluder(engine, false)}};
+    const OccluderGroups groups(occluders);
+    std::array<std::array<float, kLanes>, 3> position{};
+    std::array<std::array<std::array<float, kLanes>, 3>, kPlaces> path{};
+    std::array<float, kLanes> open{};
+    for (std::size_t e = 0; e < kLanes; ++e) {
+      const glm::vec3 p = any_point(engine, 2);
+      open[e] = 1;
+      for (int axis = 0; axis < 3; ++axis) position[axis][e] = p[axis];
+      for (auto& to_place : path) {
+        const glm::vec3 way = any_point(engine, 2) - p;
+        for (int axis = 0; axis < 3; ++axis) to_place[axis][e] = way[axis];
+      }
+    }
+    for (const ShadowKernels* set : shadow_kernel_sets()) {
+      std::array<std::array<float, kLanes>, kPlaces> hidden{};
+      set->hide_places(everywhere.data(), groups.piece.data(), numbers.data(), kPieces,
+                       position[0].data(), kLanes, open.data(), path[0][0].data(), kPlaces, 1,
+                       hidden[0].data());
+      for (std::size_t s = 0; s < kPlaces; ++s) {
+        for (std::size_t e = 0; e < kLanes; ++e) {
+          const glm::vec3 p(position[0][e], position[1][e], position[2][e]);
+          const glm::vec3 place = p + glm::vec3(path[s][0][e], path[s][1][e], path[s][2][e]);
+          const bool expected = std::ranges::any_of(occluders.piece, [&](const Occluder& occluder) {
+            return test::crosses(occluder, p, place);
+          });
+          // With this seed no path is so near to a side that rounding decides.
+          EXPECT_EQ(hidden[s][e] == 1, expected) << set->name;
+          ++(expected ? crossed : free);
+        }
+      }
+    }
+    // What is closed is not looked at, nor what is outside of the volumes.
+    std::array<std::array<float, kLanes>, kPlaces> hidden{};
+    open.fill(0);
+    shadow_kernels().hide_places(everywhere.data(), groups.piece.data(), numbers.data(), kPieces,
+                                 position[0].data(), kLanes, open.data(), path[0][0].data(),
+                                 kPlaces, 1, hidden[0].data());
+    for (const auto& of_place : hidden) {
+      EXPECT_TRUE(std::ranges::all_of(of_place, [](float h) { return h == 0; }));
+    }
+  }
+  EXPECT_GT(crossed, 1000);
+  EXPECT_GT(free, 1000);
+}
+
 TEST(ShadowKernels, InstructionSetsAgree) {
   SCOPED_TRACE(kSeed);
   std::mt19937 engine(kSeed);
