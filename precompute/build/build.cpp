@@ -124,6 +124,7 @@ class TransferBuild {
     const auto make = links ? make_operator_from_links : make_operator_from_pairs;
     make(*tracer_, decided_, roles_, data_, report_, clock_);
     data_.emitted_irradiance = irradiance_from_emitters(data_);
+    add_receiver_rows(model_.shown_patch, *tracer_, settings_, data_, clock_);
   }
 
   /// All that follows on the scene.
