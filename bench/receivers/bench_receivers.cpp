@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "bench/support/input.h"
 #include "bench/support/program.h"
@@ -12,12 +13,16 @@
 #include "precompute/outputs/receiver_rows.h"
 #include "runtime/outputs/vertex_light.h"
 #include "runtime/rays/triangle.h"
+#include "transfer/base/area_norm.h"
 #include "transfer/operator/receiver_products.h"
 
 namespace rebounce::bench {
 namespace {
 
 constexpr std::uint64_t kSeed = 77;  // not that of the lights that sets are chosen by
+
+// Lights of which less than this part arrives anywhere are left out: those in a slot, or outside.
+constexpr double kLeastArriving = 0.1;
 
 struct Options {
   InputOptions input;
@@ -85,16 +90,30 @@ class ReceiverBenchmark {
     return light;
   }
 
-  double difference(std::span<const Float3> light, std::span<const Float3> truth) const {
-    double off = 0, all = 0;
+  double flux_of(std::span<const Float3> light) const {
+    double sum = 0;
+    for (std::size_t i = 0; i < light.size(); ++i) {
+      const auto& [r, g, b] = light[i];
+      sum += static_cast<double>(data_.patches.area[i]) * (r + g + b);
+    }
+    return sum;
+  }
+
+  /// Root mean square over the area, relative to the light of the patches.
+  double difference(std::span<const Float3> light, std::span<const Float3> truth,
+                    std::span<const Float3> of_patches) const {
+    double off = 0, area = 0;
     for (const std::uint32_t v : compared_) {
+      area += area_[v];
       for (std::size_t c = 0; c < kChannelCount; ++c) {
         const double d = static_cast<double>(light[v][c]) - truth[v][c];
         off += area_[v] * d * d;
-        all += area_[v] * static_cast<double>(truth[v][c]) * truth[v][c];
       }
     }
-    return all > 0 ? std::sqrt(off / all) : 0;
+    const std::vector<float>& areas = data_.patches.area;
+    const double whole = std::accumulate(areas.begin(), areas.end(), 0.0);
+    const double usual = area_norm(of_patches, areas) / std::sqrt(whole);
+    return usual > 0 ? std::sqrt(off / area) / usual : 0;
   }
 
   void add_row(const Made& made, double tolerance, std::uint32_t sets, LightKind kind,
@@ -107,9 +126,10 @@ class ReceiverBenchmark {
     std::vector<Float3> indirect(data_.patches.size());
     for (std::size_t k = 0; k < lights.size(); ++k) {
       data_.transfer->apply(lights[k], indirect, workspace);
+      if (flux_of(indirect) < kLeastArriving * flux_of(lights[k])) continue;
       const std::vector<Float3> truth = shown(exact_, indirect, radiosities[k]);
-      error.push_back(difference(shown(made.rows, indirect, radiosities[k]), truth));
-      of_weights.push_back(difference(shown({}, indirect, radiosities[k]), truth));
+      error.push_back(difference(shown(made.rows, indirect, radiosities[k]), truth, indirect));
+      of_weights.push_back(difference(shown({}, indirect, radiosities[k]), truth, indirect));
     }
     const auto mean = [](std::span<const double> values) {
       double sum = 0;
@@ -123,6 +143,7 @@ class ReceiverBenchmark {
     const std::size_t with_rows =
         made.rows.vertex.size() -
         static_cast<std::size_t>(std::ranges::count(made.rows.vertex, kNone));
+    if (error.empty()) return;
     table.add({scene_name(data_), data_.patches.size(), tolerance, sets, std::string(name(kind)),
                mean(of_weights), std::ranges::max(of_weights), mean(error), std::ranges::max(error),
                compared_.size(), with_rows, bytes, made.seconds,

@@ -197,6 +197,9 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   settings.form_factors = with_quality(quality_named(chosen.quality), settings.form_factors);
   if (!chosen.precision.empty()) settings.precision = precision_named(chosen.precision);
   settings.operator_kind = operator_kind(chosen.operator_kind);
+  if (chosen.reader == "web" && chosen.receivers_at != "patches") {
+    throw Error("pages show no rows of vertices; with --for web take --receivers-at patches");
+  }
   settings.receiver_rows.at_vertices = chosen.receivers_at == "vertices";
   settings.memory_limit_bytes =
       static_cast<std::uint64_t>(chosen.memory_limit_gib * static_cast<double>(1ULL << 30));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 
 #include "precompute/base/parallel_progress.h"
@@ -248,39 +249,72 @@ class RowBuilder {
     for (const std::uint32_t k : kept) group.vertices.push_back(vertices[k]);
     group.clusters =
         choose_sets(sources_, rows, {settings_.tolerance, settings_.most_sets, kSinglePatchWeight});
-    round(rows, group);
+    round(parts_of_sets(rows, group.clusters), group);
     return group;
   }
 
-  /// Rounds the parts of the sets to bytes. What one loses by rounding the next one gets, so that
-  /// the sum of a row stays what it is.
-  void round(const GroupRows& rows, Group& group) const {
-    const std::size_t sets = (group.clusters.size() + kSetStep - 1) / kSetStep * kSetStep;
-    group.value.assign(sets * kGroup, 0);
-    group.scale.assign(sets, 0.0F);
-    Eigen::VectorXf carried = Eigen::VectorXf::Zero(rows.part.rows());
-    std::size_t first = 0;
-    for (std::size_t j = 0; j < group.clusters.size(); ++j) {
-      const Cluster& cluster = sources_.tree.clusters[group.clusters[j]];
-      while (rows.position[first] < cluster.begin) ++first;
-      std::size_t last = first;
-      while (last < rows.position.size() && rows.position[last] < cluster.begin + cluster.count)
-        ++last;
-      const Eigen::VectorXf part =
-          rows.part
-              .middleCols(static_cast<Eigen::Index>(first), static_cast<Eigen::Index>(last - first))
-              .rowwise()
-              .sum();
+  /// The parts of the sets [receivers][sets] that the receivers of a group see more than by their
+  /// weights.
+  Eigen::MatrixXf parts_of_sets(const GroupRows& rows,
+                                std::span<const std::uint32_t> clusters) const {
+    Eigen::MatrixXf parts(rows.part.rows(), static_cast<Eigen::Index>(clusters.size()));
+    Eigen::Index first = 0;
+    for (Eigen::Index j = 0; j < parts.cols(); ++j) {
+      const Cluster& cluster = sources_.tree.clusters[clusters[static_cast<std::size_t>(j)]];
+      const auto end = std::ranges::lower_bound(rows.position, cluster.begin + cluster.count);
+      const Eigen::Index last = end - rows.position.begin();
+      parts.col(j) = rows.part.middleCols(first, last - first).rowwise().sum();
       first = last;
-      const float scale = part.cwiseAbs().maxCoeff() / kLargestByte;
-      if (scale <= 0) continue;
-      group.scale[j] = scale;
-      for (Eigen::Index i = 0; i < part.size(); ++i) {
-        const float wanted = part[i] + carried[i];
-        const float rounded = std::clamp(std::round(wanted / scale), -kLargestByte, kLargestByte);
-        carried[i] = wanted - rounded * scale;
+    }
+    return parts;
+  }
+
+  /// Rounds the parts of the sets to bytes.
+  void round(const Eigen::MatrixXf& parts, Group& group) const {
+    const auto sets = static_cast<std::size_t>(parts.cols());
+    const std::size_t padded = (sets + kSetStep - 1) / kSetStep * kSetStep;
+    group.value.assign(padded * kGroup, 0);
+    group.scale.assign(padded, 0.0F);
+    Eigen::MatrixXf rounded(parts.rows(), parts.cols());
+    for (Eigen::Index j = 0; j < parts.cols(); ++j) {
+      const float scale = parts.col(j).cwiseAbs().maxCoeff() / kLargestByte;
+      group.scale[static_cast<std::size_t>(j)] = scale;
+      rounded.col(j) = scale > 0 ? Eigen::VectorXf((parts.col(j) / scale).array().round())
+                                 : Eigen::VectorXf::Zero(parts.rows());
+    }
+    keep_sums(parts, group.scale, rounded);
+    for (std::size_t j = 0; j < sets; ++j) {
+      for (Eigen::Index i = 0; i < parts.rows(); ++i) {
         group.value[ReceiverRows::value_index(j, static_cast<std::size_t>(i))] =
-            static_cast<std::int8_t>(rounded);
+            static_cast<std::int8_t>(rounded(i, static_cast<Eigen::Index>(j)));
+      }
+    }
+  }
+
+  /// Changes rounded values by 1 until the sum of each row is what it was, so that even light stays
+  /// exact. Sets with large scales come first; a value of 0 stays, since its receiver may not see
+  /// the set.
+  static void keep_sums(const Eigen::MatrixXf& parts, std::span<const float> scale,
+                        Eigen::MatrixXf& rounded) {
+    std::vector<Eigen::Index> order(static_cast<std::size_t>(parts.cols()));
+    std::iota(order.begin(), order.end(), Eigen::Index{0});
+    std::ranges::stable_sort(order, std::ranges::greater(),
+                             [&](Eigen::Index j) { return scale[static_cast<std::size_t>(j)]; });
+    for (Eigen::Index i = 0; i < parts.rows(); ++i) {
+      double missing = 0;
+      for (const Eigen::Index j : order) {
+        missing += static_cast<double>(parts(i, j)) -
+                   static_cast<double>(scale[static_cast<std::size_t>(j)]) * rounded(i, j);
+      }
+      for (const Eigen::Index j : order) {
+        const float step = scale[static_cast<std::size_t>(j)];
+        const float changed = rounded(i, j) + (missing > 0 ? 1.0F : -1.0F);
+        if (std::abs(missing) <= 0.5 * step || rounded(i, j) == 0 ||
+            std::abs(changed) > kLargestByte) {
+          continue;
+        }
+        rounded(i, j) = changed;
+        missing -= missing > 0 ? step : -step;
       }
     }
   }
