@@ -14,16 +14,14 @@
 #include "runtime/lights/light_sampling.h"
 #include "runtime/lights/sky_light.h"
 #include "runtime/outputs/vertex_light.h"
-#include "runtime/rays/cumulative_choice.h"
 #include "runtime/rays/triangle.h"
-#include "transfer/base/grouped.h"
 #include "transfer/base/reflection.h"
 
 namespace rebounce::reference {
 namespace {
 
-// Rays from a point and from a vertex, of which the noise is far below what is looked for.
-constexpr std::size_t kPointRays = 1024, kVertexRays = 512;
+// Rays from a point, of which the noise is far below what is looked for.
+constexpr std::size_t kPointRays = 1024;
 
 constexpr int kDirectPointsOfRows = 64;  // of a patch
 constexpr int kLampPlaces = 4;           // of a lamp with a surface, from where a ray ends
@@ -171,75 +169,6 @@ class PointGathering {
   std::vector<Float3> position_, normal_, lamps_there_;
 };
 
-/// Points around a vertex, as dense as its hat function is high: rays from them see what a mean
-/// with the weights of the interpolation sees.
-class HatPoints {
- public:
-  HatPoints(const DisplayMesh& mesh, std::uint32_t vertex, std::span<const std::uint32_t> triangles)
-      : mesh_(mesh), vertex_(vertex), triangles_(triangles) {
-    for (const std::uint32_t t : triangles) choice_.add(area_of(corners_of(mesh, t)));
-  }
-
-  bool empty() const { return !(choice_.total() > 0); }
-
-  PatchPoint at(const glm::dvec2& square) const {
-    const auto [index, rest] = choice_.choose(square.x);
-    const std::uint32_t t = triangles_[index];
-    const TriangleCorners p = corners_of(mesh_, t);
-    std::size_t own = 0;
-    while (mesh_.triangle[t][own] != vertex_) ++own;
-    // The distance x from the vertex, 1 on the far side, has the density 6 x (1 - x).
-    const double x = 0.5 - std::sin(std::asin(1 - 2 * rest) / 3);
-    const glm::dvec3 far = glm::mix(p[(own + 1) % 3], p[(own + 2) % 3], square.y);
-    return {to_float3(glm::mix(p[own], far, x)), to_float3(front_normal(p))};
-  }
-
- private:
-  const DisplayMesh& mesh_;
-  std::uint32_t vertex_;
-  std::span<const std::uint32_t> triangles_;
-  CumulativeChoice choice_;
-};
-
-/// The light [v] that rows of vertices gather; 0 at vertices of triangles that none of `shown` is.
-std::vector<Float3> gather_at_vertices(const PatchSolution& solution,
-                                       const ReconstructionComparison& shown,
-                                       std::span<const Float3> radiosity) {
-  const DisplayMesh& mesh = solution.data.mesh;
-  std::vector<std::uint8_t> wanted(mesh.position.size(), 0);
-  for (const std::uint32_t t : shown.triangle) {
-    for (const std::uint32_t v : mesh.triangle[t]) wanted[v] = 1;
-  }
-  const Grouped<std::uint32_t> triangles(wanted.size(), [&](const auto& add) {
-    for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t) {
-      if (mesh.triangle_patch[t] == kNone) continue;
-      for (const std::uint32_t v : mesh.triangle[t]) {
-        if (wanted[v] != 0) add(v, t);
-      }
-    }
-  });
-  std::vector<Float3> light(wanted.size(), Float3{0, 0, 0});
-#pragma omp parallel
-  {
-    PlaceViewer viewer(solution);
-    std::vector<PatchPoint> from(kVertexRays);
-#pragma omp for schedule(dynamic, 16)
-    for (std::uint32_t v = 0; v < light.size(); ++v) {
-      const HatPoints hat(mesh, v, triangles[v]);
-      if (hat.empty()) continue;
-      // The same sequences for all vertices: neighbours then err alike.
-      const PointSequence places = r2_sequence({0.25, 0.75});
-      for (std::uint32_t k = 0; k < from.size(); ++k) from[k] = hat.at(places[k]);
-      glm::dvec3 sum(0);
-      for (const SeenPlace& place : viewer.look(from, {0.5, 0.5})) {
-        sum += to_dvec3(radiosity[place.patch]);
-      }
-      light[v] = to_float3(sum / static_cast<double>(kVertexRays));
-    }
-  }
-  return light;
-}
-
 }  // namespace
 
 ReceiverErrors compare_receivers(const PatchSolution& solution,
@@ -253,7 +182,6 @@ ReceiverErrors compare_receivers(const PatchSolution& solution,
   for (const Light& lamp : solution.lights) check_light(lamp);
   const DisplayMesh& mesh = solution.data.mesh;
   const PatchLight light = light_of_patches(solution);
-  const std::vector<Float3> at_vertices = gather_at_vertices(solution, shown, light.radiosity);
   std::vector<PointLight> gathered(shown.point.size());
 #pragma omp parallel
   {
@@ -264,22 +192,20 @@ ReceiverErrors compare_receivers(const PatchSolution& solution,
                                         unit_square(mix_bits(seed ^ mix_bits(shown.point[k]))));
     }
   }
-  std::array<ErrorSum, 6> sum;
+  std::array<ErrorSum, 5> sum;
   for (std::size_t k = 0; k < gathered.size(); ++k) {
     const std::uint32_t p = shown.point[k], t = shown.triangle[k];
     const std::uint32_t patch = mesh.triangle_patch[t];
     const Float3 of_patch = patch == kNone ? Float3{0, 0, 0} : solution.indirect_irradiance[patch];
-    const Float3 of_vertices =
-        to_float3(interpolated(mesh, at_vertices, t, to_dvec3(points[p].position)));
     const auto& [rows, smooth, exact, both] = gathered[k];
-    const std::array<Float3, 6> value{of_patch, rows, of_vertices, smooth, exact, both};
+    const std::array<Float3, 5> value{of_patch, rows, smooth, exact, both};
     for (std::size_t way = 0; way < value.size(); ++way) {
       sum[way].add(1, value[way], truth.mean[p], truth.standard_error[p]);
     }
   }
   const std::size_t left_out = points.size() - shown.point.size();
   return {sum[0].result(left_out), sum[1].result(left_out), sum[2].result(left_out),
-          sum[3].result(left_out), sum[4].result(left_out), sum[5].result(left_out)};
+          sum[3].result(left_out), sum[4].result(left_out)};
 }
 
 }  // namespace rebounce::reference

@@ -15,7 +15,6 @@ namespace rebounce::reference {
 struct ReceiverErrors {
   RelativeError patch_value;   ///< that of the patch on which the point lies
   RelativeError rows;          ///< a row of the point's own, times the radiosity of patches
-  RelativeError vertex_rows;   ///< rows of the vertices around the point, interpolated
   RelativeError smooth_light;  ///< as `rows`, but patches reflect the indirect light shown on them
   RelativeError exact_lamps;   ///< as `rows`, but lamps are looked at where each ray ends
   RelativeError exact_both;    ///< as `rows`, with both: patches only carry reflectance and sky

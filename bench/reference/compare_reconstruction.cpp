@@ -5,7 +5,9 @@
 #include "bench/reference/scene_surface.h"
 #include "precompute/patches/lit_sides.h"
 #include "rebounce/error.h"
+#include "runtime/outputs/vertex_light.h"
 #include "runtime/rays/float3_glm.h"
+#include "transfer/operator/receiver_products.h"
 
 namespace rebounce::reference {
 namespace {
@@ -53,22 +55,12 @@ class MeshLocator {
   std::vector<CoincidentSide> sides_;
 };
 
-glm::dvec3 vertex_value(const DisplayMesh& mesh, std::span<const Float3> patch_value,
-                        std::uint32_t vertex) {
-  glm::dvec3 value(0);
-  for (std::uint32_t k = mesh.weight_begin[vertex]; k < mesh.weight_begin[vertex + 1]; ++k) {
-    value += static_cast<double>(mesh.weight[k]) * to_dvec3(patch_value[mesh.weight_patch[k]]);
-  }
-  return glm::max(value, glm::dvec3(0));  // some weights are negative
-}
-
-Float3 reconstruct(const DisplayMesh& mesh, std::span<const Float3> patch_value,
-                   const MeshPoint& point) {
+Float3 interpolated(const DisplayMesh& mesh, std::span<const Float3> at_vertices,
+                    const MeshPoint& point) {
   glm::dvec3 value(0);
   for (int corner = 0; corner < 3; ++corner) {
     value += point.weight[corner] *
-             vertex_value(mesh, patch_value,
-                          mesh.triangle[point.triangle][static_cast<std::size_t>(corner)]);
+             to_dvec3(at_vertices[mesh.triangle[point.triangle][static_cast<std::size_t>(corner)]]);
   }
   return to_float3(value);
 }
@@ -79,13 +71,20 @@ ReconstructionComparison compare_reconstruction(const TransferData& data,
                                                 const RayTracer& mesh_tracer,
                                                 std::span<const Float3> indirect_irradiance,
                                                 std::span<const SurfacePoint> points,
-                                                const IrradianceEstimate& truth) {
+                                                const IrradianceEstimate& truth,
+                                                std::span<const Float3> radiosity) {
   if (indirect_irradiance.size() != data.patches.size() || truth.mean.size() != points.size()) {
     throw Error("comparison of the reconstruction: one entry per patch and point is needed");
   }
   if (data.mesh.weight_begin.size() != data.mesh.position.size() + 1) {
     throw Error("comparison of the reconstruction: the mesh has no reconstruction weights");
   }
+  std::vector<Float3> at_vertices(data.mesh.position.size());
+  reconstruct_at_vertices(data.mesh, indirect_irradiance, at_vertices);
+  if (!radiosity.empty()) {
+    ReceiverProducts(data.receiver_rows, data.patches.area).add(radiosity, at_vertices);
+  }
+  clamp_light(at_vertices);
   MeshLocator locator(data.mesh, mesh_tracer);
   ErrorSum sum;
   ReconstructionComparison comparison;
@@ -96,7 +95,7 @@ ReconstructionComparison compare_reconstruction(const TransferData& data,
       ++left_out;
       continue;
     }
-    const Float3 shown = reconstruct(data.mesh, indirect_irradiance, *place);
+    const Float3 shown = interpolated(data.mesh, at_vertices, *place);
     comparison.point.push_back(static_cast<std::uint32_t>(k));
     comparison.triangle.push_back(place->triangle);
     comparison.shown.push_back(shown);

@@ -30,6 +30,7 @@ struct Options {
   std::string quality = "default";  ///< of the form factors
   std::vector<std::size_t> patch_counts{1000, 4000};
   bool key_light = false;
+  ReceiverRowSettings rows;
   std::size_t point_count = 20000;
   std::uint32_t samples = 512;
   int direct_points = DirectLightingSettings{}.points_per_patch;
@@ -85,7 +86,8 @@ class TruthBench {
                                    solution.indirect_irradiance, bounce);
     }
     const reference::ReconstructionComparison shown = reference::compare_reconstruction(
-        solution.data, solution.tracer, solution.indirect_irradiance, points_, truth_);
+        solution.data, solution.tracer, solution.indirect_irradiance, points_, truth_,
+        solution.radiosity);
     if (last && !options_.point_csv.empty()) {
       reference::write_point_table(options_.point_csv, solution.data, points_, truth_, shown);
     }
@@ -133,7 +135,8 @@ class TruthBench {
   reference::Solution solve(std::size_t patch_count) {
     const reference::PipelineSettings settings{.patch_count = patch_count,
                                                .quality = quality_named(options_.quality),
-                                               .direct_points = options_.direct_points};
+                                               .direct_points = options_.direct_points,
+                                               .receiver_rows = options_.rows};
     return reference::solve_scene(
         options_.scene, settings, setup_.lights, setup_.sky,
         [this](std::string_view phase, double part) { return bar_.update(phase, part); });
@@ -160,8 +163,8 @@ void run(const Options& options) {
                                    "points_compared",
                                    "points_left_out"};
   if (options.receivers) {
-    columns.insert(columns.end(), {"patch_value_error", "row_error", "vertex_row_error",
-                                   "smooth_light_error", "exact_lamp_error", "exact_both_error"});
+    columns.insert(columns.end(), {"patch_value_error", "row_error", "smooth_light_error",
+                                   "exact_lamp_error", "exact_both_error"});
   }
   bench::Table table(std::move(columns));
   {
@@ -181,8 +184,8 @@ void run(const Options& options) {
                                             shown.left_out_count};
       if (options.receivers) {
         const reference::ReceiverErrors& of = row.receivers;
-        for (const auto& e : {of.patch_value, of.rows, of.vertex_rows, of.smooth_light,
-                              of.exact_lamps, of.exact_both}) {
+        for (const auto& e :
+             {of.patch_value, of.rows, of.smooth_light, of.exact_lamps, of.exact_both}) {
           cells.push_back(e.error);
         }
       }
@@ -233,6 +236,14 @@ void add_options(CLI::App& app, Options& options) {
   app.add_flag("--receivers", options.receivers,
                "Add the errors that points would have with rows of their own, and with light of "
                "patches that varies on them");
+  app.add_flag("--rows-at-vertices", options.rows.at_vertices, "Give vertices rows of their own");
+  app.add_option("--receiver-rays", options.rows.ray_count, "Rays of each of these vertices")
+      ->capture_default_str();
+  app.add_option("--receiver-sets", options.rows.most_sets,
+                 "Sets that a group of them sees at most")
+      ->capture_default_str();
+  app.add_option("--receiver-tolerance", options.rows.tolerance, "Error at which rows end")
+      ->capture_default_str();
   app.add_option("--point-csv", options.point_csv,
                  "Table to write of the compared points, for the last number of patches");
   app.add_option("--error-picture", options.error_picture,

@@ -43,7 +43,9 @@ Solution solve_scene(const std::string& scene, const PipelineSettings& settings,
                      std::span<const Light> lights, const Sky& sky, const BuildProgress& progress) {
   BuildSettings build;
   build.subdivision.patch_count = settings.patch_count;
-  build.operator_kind = OperatorKind::kNoOperator;
+  build.receiver_rows = settings.receiver_rows;
+  build.operator_kind =
+      settings.receiver_rows.at_vertices ? OperatorKind::kHierarchical : OperatorKind::kNoOperator;
   build.store_form_factors = true;
   build.form_factors = with_quality(settings.quality, build.form_factors);
   BuildReport report;
@@ -59,7 +61,7 @@ Solution solve_scene(const std::string& scene, const PipelineSettings& settings,
       kMethod, *form_factors, {patches.area, patches.reflectance}, exitance, {}, radiosity);
   if (!result.converged) throw Error(scene + ": the solver did not converge");
   std::vector<Float3> indirect = gather(*form_factors, radiosity);
-  return {std::move(data), std::move(tracer), std::move(indirect)};
+  return {std::move(data), std::move(tracer), std::move(indirect), std::move(radiosity)};
 }
 
 void draw_error(const Solution& solution, const PatchComparison& patches, const std::string& path) {

@@ -7,6 +7,7 @@
 #include "bench/reference/compare.h"
 #include "precompute/exchange/pairs/form_factor_settings.h"
 #include "rebounce/build_report.h"
+#include "rebounce/build_settings.h"
 #include "runtime/rays/ray_tracer.h"
 #include "transfer/file/transfer_data.h"
 
@@ -16,6 +17,7 @@ struct PipelineSettings {
   std::size_t patch_count = 1000;
   FormFactorQuality quality = FormFactorQuality::kDefault;
   int direct_points = 0;  ///< of a patch at which lamps are looked at
+  ReceiverRowSettings receiver_rows{};
 };
 
 /// One number of patches: its form factors, and their light.
@@ -23,6 +25,7 @@ struct Solution {
   TransferData data;
   RayTracer tracer;                         ///< the surface of data.mesh
   std::vector<Float3> indirect_irradiance;  ///< [n] lx
+  std::vector<Float3> radiosity;            ///< [n] lx
 };
 
 /// Solves the scene of a file under these lights with the form factors themselves: an operator adds

@@ -37,6 +37,9 @@ BuildSettings decide(BuildSettings settings, const PatchModel& model) {
   if (restricted_roles && !hierarchical) {
     throw Error("receivers and sources are for hierarchical operators alone; ask for one");
   }
+  if (settings.receiver_rows.at_vertices && settings.operator_kind == OperatorKind::kNoOperator) {
+    throw Error("rows of vertices need an operator; ask for one, or for receivers at patches");
+  }
   if (!settings.precision) {
     const bool dense = settings.operator_kind == OperatorKind::kDense;
     settings.precision = hierarchical ? Precision::kQ8 : dense ? Precision::kF32 : Precision::kF16;

@@ -92,6 +92,14 @@ std::uint64_t bytes_of_weights(const BuiltScene& scene) {
          kWeighedBytes * std::min(scene.vertex_count, kWeighedOfPatch * scene.patch_count);
 }
 
+/// Rows of vertices: of the patches, as sparse as rays leave them, and twice what is stored.
+std::uint64_t bytes_of_receiver_rows(const PatchModel& model, const ReceiverRowSettings& rows) {
+  if (!rows.at_vertices) return 0;
+  const std::uint64_t n = model.patches.size(), rays = static_cast<std::uint64_t>(rows.ray_count);
+  return sizeof(std::uint64_t) * n * std::min(n, rays) +
+         4 * std::uint64_t{rows.most_sets} * model.mesh.position.size();
+}
+
 }  // namespace
 
 std::uint64_t memory_limit_bytes(const BuildSettings& settings) {
@@ -165,7 +173,9 @@ CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
   const std::uint32_t matrices = distinct_channels(model.patches.reflectance);
   CostEstimate estimate = estimate_of(scene.patch_count, roles);
   if (decided.exchange_source == ExchangeSource::kPairs) {
-    estimate.peak_bytes = peak_bytes_of_pairs(scene, matrices, decided.operator_kind, decided.rank);
+    estimate.peak_bytes =
+        peak_bytes_of_pairs(scene, matrices, decided.operator_kind, decided.rank) +
+        bytes_of_receiver_rows(model, decided.receiver_rows);
     return estimate;
   }
   const LinkedBuild build{
@@ -174,7 +184,8 @@ CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
   estimate.peak_bytes = peak_bytes_of_links(build);
   if (decided.operator_kind != OperatorKind::kNoOperator) {
     estimate.peak_bytes =
-        std::max(estimate.peak_bytes, peak_bytes_after_links(build, decided.memory_limit_bytes));
+        std::max(estimate.peak_bytes, peak_bytes_after_links(build, decided.memory_limit_bytes) +
+                                          bytes_of_receiver_rows(model, decided.receiver_rows));
   }
   return estimate;
 }
@@ -195,7 +206,8 @@ CostEstimate estimate_after_links(const PatchModel& model, std::size_t link_coun
                                          model.patches.reflectance, roles, decided.tolerance);
   CostEstimate estimate = estimate_of(build.scene.patch_count, roles);
   estimate.link_count = link_count;
-  estimate.peak_bytes = peak_bytes_after_links(build, decided.memory_limit_bytes);
+  estimate.peak_bytes = peak_bytes_after_links(build, decided.memory_limit_bytes) +
+                        bytes_of_receiver_rows(model, decided.receiver_rows);
   return estimate;
 }
 

@@ -38,6 +38,10 @@ std::string settings_json(const BuildSettings& settings, double form_factor_tole
                       {"probe_spacing", settings.probes.spacing},
                       {"probe_rays_each", settings.probes.ray_count},
                       {"surface_harmonic_rays", settings.surface_harmonics.ray_count},
+                      {"receiver_rows_at_vertices", settings.receiver_rows.at_vertices},
+                      {"receiver_row_rays", settings.receiver_rows.ray_count},
+                      {"receiver_row_tolerance", settings.receiver_rows.tolerance},
+                      {"receiver_row_sets", settings.receiver_rows.most_sets},
                       {"lightmap_size", settings.lightmap.size},
                       {"lightmap_padding", settings.lightmap.padding}};
   if (is_hierarchical(settings)) json["tolerance"] = settings.tolerance;

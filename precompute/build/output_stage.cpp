@@ -2,6 +2,7 @@
 
 #include "precompute/outputs/light_probes.h"
 #include "precompute/outputs/lightmap.h"
+#include "precompute/outputs/receiver_rows.h"
 #include "precompute/outputs/reconstruction_weights.h"
 #include "precompute/outputs/surface_harmonics.h"
 
@@ -25,10 +26,11 @@ void make_outputs(std::span<const std::uint32_t> shown_patch, const RayTracer& t
   });
   const bool probes = settings.probes.grid[0] > 0 || settings.probes.spacing > 0;
   const bool harmonics = settings.surface_harmonics.ray_count > 0;
-  if ((probes || harmonics) && !settings.receivers.empty()) {
+  const bool rows = settings.receiver_rows.at_vertices;
+  if ((probes || harmonics || rows) && !settings.receivers.empty()) {
     report.warnings.emplace_back(
-        "light probes and surface harmonics see patches that are no receivers without their "
-        "indirect light");
+        "light probes, surface harmonics and rows of vertices see patches that are no receivers "
+        "without their indirect light");
   }
   if (probes) {
     data.probes = clock.run("probes", [&](const Progress& part) {
@@ -42,6 +44,15 @@ void make_outputs(std::span<const std::uint32_t> shown_patch, const RayTracer& t
       return trace_surface_harmonics(data, shown_patch, tracer, settings.surface_harmonics, part);
     });
   }
+}
+
+void add_receiver_rows(std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
+                       const BuildSettings& settings, TransferData& data, PhaseClock& clock) {
+  if (!settings.receiver_rows.at_vertices) return;
+  data.receiver_rows = clock.run("rows of vertices", [&](const Progress& part) {
+    return make_receiver_rows(data, shown_patch, tracer, settings.receiver_rows,
+                              settings.form_factors.seed, part);
+  });
 }
 
 }  // namespace rebounce

@@ -201,6 +201,7 @@ std::string origin_text(const json& settings, const json& report) {
 /// The outputs that a file has.
 std::string outputs_text(const TransferData& data) {
   std::string text = "patches, vertices";
+  if (!data.receiver_rows.empty()) text += " with rows of their own";
   if (data.probes.size() > 0) text += fmt::format(", {} light probes", data.probes.size());
   if (!data.lightmap.empty()) {
     text += fmt::format(", a lightmap of {} x {}", data.lightmap.width, data.lightmap.height);
@@ -233,6 +234,8 @@ std::string lacking_text(const TransferData& data) {
   add(!data.links.empty(), "--store-links", "hierarchical radiosity");
   add(data.probes.size() > 0, "--probes 1", "light on what moves, a probe a metre");
   add(!data.lightmap.empty(), "--lightmap 1024", "light in a texture, for scenes with TEXCOORD_1");
+  add(!data.receiver_rows.empty(), "--receivers-at vertices",
+      "detail of bounced light in scenes full of small things");
   add(!data.surface_harmonics.empty(), "--surface-harmonics 512", "light on normal maps");
   return text.empty() ? "" : "\nWhat precompute would add with\n" + text;
 }

@@ -23,7 +23,8 @@ namespace rebounce::cli {
 namespace {
 
 struct PrecomputeOptions {
-  std::string scene, output, form_factors, precision, reader, quality = "default";
+  std::string scene, output, form_factors, precision, reader, quality = "default",
+                                                              receivers_at = "patches";
   std::string operator_kind = "hierarchical";
   std::vector<std::string> receivers, sources;  ///< each a list
   BuildSettings settings;
@@ -175,6 +176,10 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   settings.form_factors = with_quality(quality_named(chosen.quality), settings.form_factors);
   if (!chosen.precision.empty()) settings.precision = precision_named(chosen.precision);
   settings.operator_kind = operator_kind(chosen.operator_kind);
+  if (chosen.reader == "web" && chosen.receivers_at != "patches") {
+    throw Error("pages show no rows of vertices; with --for web take --receivers-at patches");
+  }
+  settings.receiver_rows.at_vertices = chosen.receivers_at == "vertices";
   settings.memory_limit_bytes =
       static_cast<std::uint64_t>(chosen.memory_limit_gib * static_cast<double>(1ULL << 30));
   check_can_write(chosen.output);
@@ -311,6 +316,28 @@ void add_output_options(CLI::App& command, PrecomputeOptions& chosen) {
                   "Texels along each side of a lightmap, for scenes with second texture "
                   "coordinates (TEXCOORD_1)")
       ->check(CLI::Range(kSmallestLightmap, kLargestLightmap));
+  command
+      .add_option("--receivers-at", chosen.receivers_at,
+                  "Where light arrives by rows of its own: at patches alone, from which vertices "
+                  "mix theirs; or at vertices too, for scenes full of small things")
+      ->check(CLI::IsMember({"patches", "vertices"}))
+      ->capture_default_str();
+  ReceiverRowSettings& rows = chosen.settings.receiver_rows;
+  command
+      .add_option("--receiver-rays", rows.ray_count, "Rays of each vertex, with rows of its own")
+      ->check(CLI::Range(64, 1000000))
+      ->capture_default_str();
+  command
+      .add_option("--receiver-tolerance", rows.tolerance,
+                  "Error of the light at vertices at which rows of their own end")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  command
+      .add_option(
+          "--receiver-sets", rows.most_sets,
+          "Sets of patches that a group of vertices sees at most; 9/8 bytes of a vertex each")
+      ->check(CLI::Range(4U, ReceiverRows::kMostSets))
+      ->capture_default_str();
   command
       .add_option("--surface-harmonics", chosen.settings.surface_harmonics.ray_count,
                   "Store the directions from which light arrives at patches, for normal maps; rays "

@@ -95,6 +95,8 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
   light.sky = setup.sky;
   light.indirect_irradiance = engine.indirect_irradiance();
   light.emitted_irradiance = emitted_irradiance;
+  const std::vector<Float3> reflected = reflected_exitance(engine);
+  light.reflected_exitance = reflected;
   light.error = error;
   const PictureRenderer renderer(*data, *engine.parts().tracer);
   if (!settings.exposure && is_light(settings.show)) {

@@ -9,10 +9,26 @@
 #include "runtime/outputs/vertex_light.h"
 
 namespace rebounce {
+namespace {
+
+/// Writes the indirect irradiance at the vertices, which may be below 0.
+void write_unclamped(const Engine& engine, std::span<Float3> irradiance) {
+  const Engine::Parts& parts = engine.parts();
+  reconstruct_at_vertices(parts.data->mesh, parts.indirect_irradiance, irradiance, parts.scheduler);
+  parts.receiver_products.add(parts.radiosity, irradiance, parts.scheduler);
+}
+
+}  // namespace
 
 void vertex_irradiance(const Engine& engine, std::span<Float3> irradiance) {
-  light_at_vertices(engine.data().mesh, engine.indirect_irradiance(), irradiance,
-                    engine.scheduler());
+  if (engine.data().receiver_rows.empty()) {
+    light_at_vertices(engine.data().mesh, engine.indirect_irradiance(), irradiance,
+                      engine.scheduler());
+    return;
+  }
+  const OneThread guard(engine.parts().use);
+  write_unclamped(engine, irradiance);
+  clamp_light(irradiance, engine.scheduler());
 }
 
 void vertex_direct_irradiance(const Engine& engine, std::span<Float3> irradiance) {
@@ -39,7 +55,7 @@ void lightmap_irradiance(Engine& engine, std::span<Float3> irradiance) {
   }
   const std::span<Float3> at_vertices = engine.parts().vertex_irradiance;
   // Clamped after the interpolation, not before it.
-  reconstruct_at_vertices(data.mesh, engine.indirect_irradiance(), at_vertices, engine.scheduler());
+  write_unclamped(engine, at_vertices);
   interpolate_at_texels(data.lightmap, data.mesh, at_vertices, irradiance, engine.scheduler());
 }
 

@@ -12,6 +12,7 @@
 #include "runtime/outputs/surface_light.h"
 #include "runtime/rays/ray_tracer.h"
 #include "transfer/file/transfer_data.h"
+#include "transfer/operator/receiver_products.h"
 
 namespace rebounce {
 
@@ -52,7 +53,7 @@ struct Engine::Parts {
   void apply_transfer();
   void compute_radiosity();
 
-  EngineUse use;
+  mutable EngineUse use;
   std::shared_ptr<const TransferData> data;
   Scheduler scheduler;
   std::shared_ptr<const RayTracer> tracer;
@@ -66,6 +67,7 @@ struct Engine::Parts {
   // What outputs of a frame (outputs.h) need to be made.
   std::vector<Float3> vertex_irradiance;  ///< [v] if there is a lightmap
   std::vector<SurfaceLight> patch_light;  ///< [n] if there are surface harmonics
+  mutable ReceiverProducts receiver_products;
 };
 
 }  // namespace rebounce

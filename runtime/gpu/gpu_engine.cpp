@@ -194,6 +194,7 @@ struct GpuEngine::Parts {
     if (buffers.indirect_irradiance != 0)
       check_buffer("indirect irradiance", buffers.indirect_irradiance, patch_count);
     if (buffers.radiosity != 0) check_buffer("radiosity", buffers.radiosity, patch_count);
+    if (buffers.vertex_irradiance != 0 || buffers.lightmap_irradiance != 0) check_rows();
     if (buffers.vertex_irradiance != 0)
       check_buffer("light at vertices", buffers.vertex_irradiance, vertex_count);
     if (buffers.lightmap_irradiance != 0) {
@@ -210,6 +211,14 @@ struct GpuEngine::Parts {
     }
     check_all_differ({buffers.direct_irradiance, buffers.indirect_irradiance, buffers.radiosity,
                       buffers.vertex_irradiance, buffers.lightmap_irradiance, buffers.probe_light});
+  }
+
+  /// Rows of vertices are not on the card.
+  void check_rows() const {
+    if (scene.receiver_rows.empty()) return;
+    throw Error(
+        "the card does not add the rows of vertices that the transfer file has; take the light of "
+        "patches from the card, or make the file with --receivers-at patches");
   }
 
   static void check_all_differ(std::vector<unsigned> names) {

@@ -304,7 +304,8 @@ const float* rebounce_engine_indirect_irradiance(const rebounce_engine* engine);
 const float* rebounce_engine_radiosity(const rebounce_engine* engine);
 
 /* Indirect irradiance of the last frame at the vertices of the display mesh [vertex_count][3], at
- * least 0; and direct irradiance likewise, as smooth as patches are large. */
+ * least 0, with the rows of vertices that the file has; and direct irradiance likewise, as smooth
+ * as patches are large. */
 rebounce_status rebounce_engine_vertex_irradiance(const rebounce_engine* engine, float* irradiance,
                                                   size_t vertex_count);
 rebounce_status rebounce_engine_vertex_direct_irradiance(const rebounce_engine* engine,

@@ -44,4 +44,10 @@ void light_at_vertices(const DisplayMesh& mesh, std::span<const Float3> patch_li
   mix_patches(mesh, patch_light, 0, vertex_light, scheduler);
 }
 
+void clamp_light(std::span<Float3> light, const Scheduler& scheduler) {
+  parallel_for_pieces(scheduler, light.size(), kVerticesPerTask, [&](std::size_t v) {
+    for (float& channel : light[v]) channel = std::max(channel, 0.0F);
+  });
+}
+
 }  // namespace rebounce

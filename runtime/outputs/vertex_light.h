@@ -18,4 +18,7 @@ void reconstruct_at_vertices(const DisplayMesh& mesh, std::span<const Float3> pa
 void light_at_vertices(const DisplayMesh& mesh, std::span<const Float3> patch_light,
                        std::span<Float3> vertex_light, const Scheduler& scheduler = {});
 
+/// Makes all values at least 0.
+void clamp_light(std::span<Float3> light, const Scheduler& scheduler = {});
+
 }  // namespace rebounce

@@ -64,6 +64,7 @@ ROOMS = {
     "bench/first_frames": "The first frames of processes, each by itself.",
     "bench/build": "The offline stage by phases.",
     "bench/solve": "Sweeps over form factors, and operators under fresh lights against their bounds.",
+    "bench/receivers": "Rows of vertices: errors of their sets, bytes and times.",
     "bench/report": "Everything that ./dev report shows.",
     "bench/truth": "The offline stage and the runtime against the path tracer.",
     "tests/fuzz": "Hostile input for what reads files and for the C interface.",

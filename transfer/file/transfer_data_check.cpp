@@ -2,6 +2,8 @@
 
 #include <concepts>
 #include <limits>
+#include <optional>
+#include <vector>
 
 #include "rebounce/error.h"
 #include "transfer/base/shortest_decimal.h"
@@ -43,6 +45,7 @@ class Checker {
     check_probes();
     check_lightmap();
     check_surface_harmonics();
+    check_receiver_rows();
     check_exchange();
   }
 
@@ -332,6 +335,47 @@ class Checker {
     check_sky_harmonics(
         {tensor::kSurfaceSkyBegin, "surface_harmonics.sky_cell", "surface_harmonics.sky_weight"}, n,
         light.sky_cells);
+  }
+
+  void check_receiver_rows() const {
+    const ReceiverRows& rows_of = data_.receiver_rows;
+    if (rows_of.empty()) return;
+    const std::size_t n = data_.patches.size(), entries = rows_of.entry_set.size();
+    rows("receiver.patch", rows_of.patch.size(), n);
+    rows("receiver.scale", rows_of.scale.size(), entries);
+    rows("receiver.vertex", rows_of.vertex.size(), ReceiverRows::kGroup * rows_of.group_count());
+    rows(tensor::kReceiverValue, rows_of.value.size(), ReceiverRows::kGroup * entries);
+    numbers("receiver.scale", rows_of.scale, kNotNegative);
+    each_once("receiver.patch", rows_of.patch, n);
+    each_once("receiver.vertex", rows_of.vertex, data_.mesh.position.size(), kNone);
+    for (std::size_t k = 0; k < rows_of.set.size(); ++k) {
+      const auto [begin, end] = rows_of.set[k];
+      if (begin >= end || end > n)
+        refuse("receiver.set", "entry " + std::to_string(k) + " is empty");
+    }
+    for (std::size_t e = 0; e < entries; ++e) {
+      index("receiver.entry_set", e, rows_of.entry_set[e], rows_of.set.size());
+    }
+    begins<std::uint32_t>(tensor::kReceiverBegin, rows_of.group_begin, entries);
+    for (std::size_t g = 0; g < rows_of.group_count(); ++g) {
+      const std::uint32_t sets = rows_of.group_begin[g + 1] - rows_of.group_begin[g];
+      if (sets % ReceiverRows::kSetStep == 0 && sets <= ReceiverRows::kMostSets) continue;
+      refuse_entry(tensor::kReceiverBegin, g + 1, std::to_string(rows_of.group_begin[g + 1]),
+                   "a multiple of 4, at most 1024, after the one before it");
+    }
+  }
+
+  /// Indices below `count`, none twice, or `allowed`.
+  void each_once(const char* name, std::span<const std::uint32_t> values, std::size_t count,
+                 std::optional<std::uint32_t> allowed = {}) const {
+    std::vector<bool> there(count, false);
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (values[i] == allowed) continue;
+      index(name, i, values[i], count);
+      if (there[values[i]])
+        refuse_entry(name, i, std::to_string(values[i]), "there for the first time");
+      there[values[i]] = true;
+    }
   }
 
   void check_exchange() const {

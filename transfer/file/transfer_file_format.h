@@ -44,6 +44,8 @@ inline constexpr char kLightmapSize[] = "lightmap.size";
 inline constexpr char kSkyBegin[] = "sky.entry_begin";
 inline constexpr char kSurfaceSky[] = "surface_harmonics.sky";
 inline constexpr char kSurfaceSkyBegin[] = "surface_harmonics.sky_begin";
+inline constexpr char kReceiverBegin[] = "receiver.group_begin";
+inline constexpr char kReceiverValue[] = "receiver.value";
 inline constexpr char kDenseTiles[] = "transfer.dense.tiles";
 inline constexpr char kDenseChannelMatrix[] = "transfer.dense.channel_matrix";
 }  // namespace tensor
@@ -173,6 +175,17 @@ void visit_tensors_of_lightmap(Map& map, Visit&& visit) {
   visit("lightmap.has_texels", map.has_texels);
   visit("lightmap.triangle", map.triangle);
   visit("lightmap.weight", map.weight);
+}
+
+// All but the values.
+template <typename Rows, typename Visit>
+void visit_tensors_of_receiver_rows(Rows& rows, Visit&& visit) {
+  visit(tensor::kReceiverBegin, rows.group_begin);
+  visit("receiver.patch", rows.patch);
+  visit("receiver.set", rows.set);
+  visit("receiver.entry_set", rows.entry_set);
+  visit("receiver.scale", rows.scale);
+  visit("receiver.vertex", rows.vertex);
 }
 
 template <typename Maps, typename Visit>

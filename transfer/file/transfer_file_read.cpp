@@ -360,6 +360,18 @@ SurfaceHarmonics read_surface_harmonics(const SafetensorsFile& file) {
   return harmonics;
 }
 
+/// A file without rows of receivers has none of their tensors.
+ReceiverRows read_receiver_rows(const SafetensorsFile& file) {
+  ReceiverRows rows;
+  if (!file.tensors().contains(tensor::kReceiverBegin)) return rows;
+  visit_tensors_of_receiver_rows(rows, TensorReader(file));
+  const auto value = file.tensor<std::int8_t>(
+      tensor::kReceiverValue, {ReceiverRows::kGroup * std::uint64_t{rows.entry_set.size()}},
+      TensorType::kI8);
+  rows.value.assign(value.begin(), value.end());
+  return rows;
+}
+
 /// A file without a lightmap has none of its tensors.
 Lightmap read_lightmap(const SafetensorsFile& file) {
   Lightmap map;
@@ -394,6 +406,7 @@ TransferData read_transfer_file(const SafetensorsFile& file) {
   read_probes(file, data);
   data.lightmap = read_lightmap(file);
   data.surface_harmonics = read_surface_harmonics(file);
+  data.receiver_rows = read_receiver_rows(file);
   if (file.tensors().contains(tensor::kEmittedIrradiance)) {
     const TensorReader read(file);
     read(tensor::kEmittedIrradiance, data.emitted_irradiance);

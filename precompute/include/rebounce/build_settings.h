@@ -88,6 +88,20 @@ struct SurfaceHarmonicSettings {
   std::uint64_t seed = 1;  ///< of the sample points
 };
 
+/// What vertices of the display mesh receive beyond what their patches do (ReceiverRows).
+struct ReceiverRowSettings {
+  bool at_vertices = false;  ///< whether vertices have rows of their own
+  /// Rays of each vertex, at least 64. The noise of what vertices show falls with the number, about
+  /// in proportion to its power of 0.7; offline time grows with it.
+  int ray_count = 1024;
+  /// Relative error of the light, root mean square over lights, that rows may leave; vertices whose
+  /// weights err less have none. A smaller one takes more bytes.
+  double tolerance = 0.02;
+  /// Sets of patches that a group of 64 vertices has at most, from 4 to 1024. A vertex takes 9/8
+  /// bytes for each, and 4 more.
+  std::uint32_t most_sets = 128;
+};
+
 /// The default of BuildSettings::tolerance.
 inline constexpr double kDefaultTolerance = 0.005;
 
@@ -114,6 +128,7 @@ struct BuildSettings {
   ProbeSettings probes;                       ///< by default none
   LightmapSettings lightmap;                  ///< by default none
   SurfaceHarmonicSettings surface_harmonics;  ///< by default none
+  ReceiverRowSettings receiver_rows;          ///< by default none; they need an operator
   OperatorKind operator_kind = OperatorKind::kHierarchical;
   /// Relative area-weighted L2 error that the indirect light of the hierarchical operator may have,
   /// averaged over lights. Twice the tolerance takes about 0.6 of the bytes.

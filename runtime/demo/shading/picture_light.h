@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "rebounce/engine.h"
 #include "rebounce/sky.h"
 #include "runtime/demo/shading/display_surface.h"
 #include "transfer/file/transfer_data.h"
@@ -18,8 +19,14 @@ struct PictureLight {
   /// F M_e in lx: the part of H that comes directly from emitters. The picture computes this part
   /// for every pixel, with sharp shadows, and takes only the rest of H from the patches.
   std::span<const Float3> emitted_irradiance{};
+  /// B - M_e in lx: what patches reflect. Rows of vertices add their part of it; without it they
+  /// are left out.
+  std::span<const Float3> reflected_exitance{};
   std::span<const float> error{};  ///< >= 0, drawn by Show::kError
 };
+
+/// B - M_e [n] in lx of the last frame.
+std::vector<Float3> reflected_exitance(const Engine& engine);
 
 /// The light of one picture as values at the vertices [v], in lx.
 struct VertexLight {

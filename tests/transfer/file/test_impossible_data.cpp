@@ -105,6 +105,50 @@ TEST(TransferFile, RefusesAnImpossibleMesh) {
   });
 }
 
+TEST(TransferFile, RefusesImpossibleRowsOfReceivers) {
+  const auto rows = [](auto change) {
+    return [change](TransferData& data) {
+      data.receiver_rows = test::sample_receiver_rows();
+      change(data.receiver_rows);
+    };
+  };
+  expect_refused({
+      {"receiver.patch: 2 rows, not 3", rows([](auto& r) { r.patch.pop_back(); })},
+      {"receiver.patch: entry 1 is 3, not below 3", rows([](auto& r) { r.patch[1] = 3; })},
+      {"receiver.patch: entry 1 is 2, not there for the first time",
+       rows([](auto& r) { r.patch[1] = 2; })},
+      {"receiver.set: entry 1 is empty", rows([](auto& r) {
+         r.set[1] = {2, 2};
+       })},
+      {"receiver.set: entry 0", rows([](auto& r) {
+         r.set[0] = {1, 4};
+       })},
+      {"receiver.entry_set: entry 2 is 2, not below 2", rows([](auto& r) { r.entry_set[2] = 2; })},
+      {"receiver.scale: entry 0", rows([](auto& r) { r.scale[0] = kNan; })},
+      {"receiver.scale: entry 1", rows([](auto& r) { r.scale[1] = -1; })},
+      {"receiver.scale: 3 rows, not 4", rows([](auto& r) { r.scale.pop_back(); })},
+      {"receiver.vertex: 127 rows, not 128", rows([](auto& r) { r.vertex.pop_back(); })},
+      {"receiver.vertex: entry 0 is 4, not below 4", rows([](auto& r) { r.vertex[0] = 4; })},
+      {"receiver.vertex: entry 127 is 3, not there for the first time",
+       rows([](auto& r) { r.vertex[127] = 3; })},
+      {"receiver.value", rows([](auto& r) { r.value.pop_back(); })},
+      {"receiver.group_begin: does not begin", rows([](auto& r) { r.group_begin[0] = 4; })},
+      {"receiver.group_begin: descends", rows([](auto& r) { r.group_begin[1] = 8; })},
+      {"receiver.group_begin: does not end", rows([](auto& r) {
+         r.group_begin = {0, 0, 0};
+       })},
+      {"receiver.group_begin: entry 1 is 3, not a multiple of 4",
+       rows([](auto& r) { r.group_begin[1] = 3; })},
+      {"receiver.group_begin: entry 1 is 1028, not a multiple of 4, at most 1024",
+       rows([](auto& r) {
+         r.group_begin = {0, 1028, 1028};
+         r.entry_set.assign(1028, 0);
+         r.scale.assign(1028, 1);
+         r.value.assign(1028 * std::size_t{64}, 0);
+       })},
+  });
+}
+
 TEST(TransferFile, RefusesAnImpossibleScene) {
   expect_refused({
       {"material.base_color:", [](auto& d) { d.materials[0].base_color[0] = kNan; }},

@@ -177,6 +177,21 @@ inline SurfaceHarmonics sample_surface_harmonics() {
   return light;
 }
 
+/// Two groups, of 4 and of no sets.
+inline ReceiverRows sample_receiver_rows() {
+  ReceiverRows rows;
+  rows.patch = {2, 0, 1};
+  rows.set = {{0, 2}, {2, 3}};
+  rows.group_begin = {0, 4, 4};
+  rows.entry_set = {0, 1, 1, 0};
+  rows.scale = {0.5F, 0.25F, 0, 1};
+  rows.vertex.assign(2 * std::size_t{ReceiverRows::kGroup}, kNone);
+  rows.vertex[1] = 3;
+  rows.vertex[64] = 0;
+  for (int k = 0; k < 4 * 64; ++k) rows.value.push_back(static_cast<std::int8_t>(k - 128));
+  return rows;
+}
+
 /// With all that a file may do without.
 inline TransferData full_sample_data(Precision precision = Precision::kF16) {
   TransferData data = sample_data(precision);
@@ -185,6 +200,7 @@ inline TransferData full_sample_data(Precision precision = Precision::kF16) {
   data.probes.patch_count = data.patches.size();
   data.lightmap = sample_lightmap(data);
   data.surface_harmonics = sample_surface_harmonics();
+  data.receiver_rows = sample_receiver_rows();
   return data;
 }
 
@@ -299,7 +315,14 @@ inline void expect_equal(const Lightmap& a, const Lightmap& b) {
               &Lightmap::triangle, &Lightmap::weight);
 }
 
+inline void expect_equal(const ReceiverRows& a, const ReceiverRows& b) {
+  expect_same(a, b, &ReceiverRows::patch, &ReceiverRows::set, &ReceiverRows::group_begin,
+              &ReceiverRows::entry_set, &ReceiverRows::scale, &ReceiverRows::vertex,
+              &ReceiverRows::value);
+}
+
 inline void expect_equal(const TransferData& a, const TransferData& b) {
+  expect_equal(a.receiver_rows, b.receiver_rows);
   expect_equal(a.sky_cells, b.sky_cells);
   expect_equal(a.probes, b.probes);
   expect_equal(a.lightmap, b.lightmap);

@@ -146,6 +146,37 @@ struct DisplayMesh {
   std::size_t surface_count() const { return back_triangle.size(); }
 };
 
+/// What vertices of the display mesh receive beyond their reconstruction weights: rows of their
+/// own, as the difference from those of their patches. A row is by sets of patches, each taken as
+/// if it shone evenly: set k has the patches at the positions [set[k][0], set[k][1]) of `patch`,
+/// and its light x is their radiosity in lx, averaged over their area.
+///
+/// Vertices are in groups of kGroup. All of a group see the same sets; set j of group g is entry
+/// e = group_begin[g] + j. To vertex number i of the group it adds value x scale[e] x its light, in
+/// lx of irradiance.
+struct ReceiverRows {
+  static constexpr std::uint32_t kGroup = 64;
+  static constexpr std::uint32_t kSetStep = 4;     ///< the sets of a group are a multiple of this
+  static constexpr std::uint32_t kMostSets = 1024;  ///< of a group
+
+  std::vector<std::uint32_t> patch;               ///< [n] a permutation
+  std::vector<std::array<std::uint32_t, 2>> set;  ///< [m]
+  std::vector<std::uint32_t> group_begin;         ///< [g + 1] of entries
+  std::vector<std::uint32_t> entry_set;           ///< [q]
+  std::vector<float> scale;                       ///< [q]
+  std::vector<std::uint32_t> vertex;              ///< [kGroup g] each vertex once at most, or kNone
+  /// [kGroup q] the value of vertex i in entry e is at value_index(e, i).
+  std::vector<std::int8_t> value;
+
+  bool empty() const { return group_begin.empty(); }
+  std::size_t group_count() const { return empty() ? 0 : group_begin.size() - 1; }
+
+  /// Entries by fours, within them vertices by fours, as integer bases are (operator_format.h).
+  static constexpr std::size_t value_index(std::size_t entry, std::size_t vertex_in_group) {
+    return entry / 4 * 4 * kGroup + vertex_in_group / 4 * 16 + entry % 4 * 4 + vertex_in_group % 4;
+  }
+};
+
 /// The directions of the sky in cells: cell 0 is all that is below the horizon, 1 to 145 are those
 /// of P. R. Tregenza, "Subdivision of the sky hemisphere for luminance measurements", Lighting
 /// Research and Technology 19 (1987), in the order of the daylighting programs: rows of 12 degrees
@@ -261,6 +292,7 @@ struct SceneData {
   LightProbes probes;                  ///< may be none
   Lightmap lightmap;                   ///< may be empty
   SurfaceHarmonics surface_harmonics;  ///< may be empty
+  ReceiverRows receiver_rows;          ///< may be empty
   BuildRecord record;
 };
 

@@ -94,7 +94,9 @@ std::vector<glm::vec3> LitScene::first_flight_at_vertices(const Sky& sky) const 
 }
 
 std::vector<glm::vec3> LitScene::bounced_at_vertices(Side side) const {
-  const PictureLight light{.indirect_irradiance = indirect(side), .emitted_irradiance = emitted_};
+  const PictureLight light{.indirect_irradiance = indirect(side),
+                           .emitted_irradiance = emitted_,
+                           .reflected_exitance = reflected_[index(side)]};
   return light_at_vertices(*data_, light).bounced;
 }
 
@@ -116,7 +118,8 @@ float LitScene::find_exposure(std::span<const Light> lights, const Sky& sky, con
                       {.lights = lights,
                        .sky = sky,
                        .indirect_irradiance = indirect(Side::kFirst),
-                       .emitted_irradiance = emitted_},
+                       .emitted_irradiance = emitted_,
+                       .reflected_exitance = reflected_[index(Side::kFirst)]},
                       camera, is_light(show) ? show : Show::kRadiosity);
 }
 

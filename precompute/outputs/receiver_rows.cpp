@@ -1,0 +1,374 @@
+#include "precompute/outputs/receiver_rows.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numeric>
+
+#include "precompute/base/parallel_progress.h"
+#include "precompute/compression/form_factor_compression.h"
+#include "precompute/outputs/receiver_sets.h"
+#include "precompute/outputs/receiver_views.h"
+#include "precompute/patches/covers.h"
+#include "rebounce/error.h"
+#include "transfer/base/grouped.h"
+
+namespace rebounce {
+namespace {
+
+constexpr int kFewestVertexRays = 64;
+constexpr std::uint32_t kGroup = ReceiverRows::kGroup, kSetStep = ReceiverRows::kSetStep;
+constexpr std::size_t kBatchGroups = 128;  // of which the rows are in memory at a time
+
+// Lights to choose sets by, of those that operators are fitted to.
+constexpr std::size_t kLights = 32;
+
+// Errors are relative to the light at a vertex or, if that is more, to this part of the light in
+// the scene's root mean square.
+constexpr float kDim = 0.1F;
+
+// lab/109
+constexpr double kSinglePatchWeight = 0.1;
+
+constexpr float kLargestByte = 127;
+
+/// Lights that the scene may have: what patches send, and what vertices get by their weights.
+struct Lights {
+  std::vector<std::vector<Float3>> radiosity;  ///< [lights][n] lx
+  Eigen::MatrixXf irradiance;                  ///< [n][lights] lx, mean of the channels
+  Eigen::VectorXf usual;                       ///< [lights] the root mean square over the area
+};
+
+Lights light_scene(const TransferData& data, const RayTracer& tracer, std::uint64_t seed) {
+  const PatchTable& patches = data.patches;
+  const DrawnLights drawn = draw_fitting_lights(data, tracer, seed, data.transfer->roles());
+  std::vector<std::vector<Float3>> exitance;
+  const std::size_t count = std::min(kLights, drawn.training.size());
+  for (std::size_t k = 0; k < count; ++k) {
+    exitance.push_back(drawn.training[k * drawn.training.size() / count]);
+  }
+  Lights lights;
+  lights.radiosity = radiosities_of(*data.transfer, patches.reflectance, exitance);
+  lights.irradiance.resize(static_cast<Eigen::Index>(patches.size()),
+                           static_cast<Eigen::Index>(count));
+  lights.usual.setZero(static_cast<Eigen::Index>(count));
+  const double whole = std::accumulate(patches.area.begin(), patches.area.end(), 0.0);
+  std::vector<Float3> arriving(patches.size());
+  std::vector<float> workspace(data.transfer->workspace_size());
+  for (std::size_t k = 0; k < count; ++k) {
+    data.transfer->apply(exitance[k], arriving, workspace);
+    double square = 0;
+    for (std::size_t i = 0; i < arriving.size(); ++i) {
+      const float mean = (arriving[i][0] + arriving[i][1] + arriving[i][2]) / kChannelCount;
+      lights.irradiance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = mean;
+      square += static_cast<double>(patches.area[i]) * mean * mean;
+    }
+    lights.usual[static_cast<Eigen::Index>(k)] = static_cast<float>(std::sqrt(square / whole));
+  }
+  return lights;
+}
+
+/// What rows of one vertex add.
+struct VertexRow {
+  ViewRow added;          ///< by position of the tree, ascending
+  Eigen::VectorXf light;  ///< [lights] that it gets then, lx
+  double gain = 0;        ///< root mean square of what they add, relative to that
+};
+
+class RowBuilder {
+ public:
+  RowBuilder(const TransferData& data, std::span<const std::uint32_t> shown_patch,
+             const RayTracer& tracer, const ReceiverRowSettings& settings, std::uint64_t seed)
+      : data_(data),
+        shown_patch_(shown_patch),
+        tracer_(tracer),
+        settings_(settings),
+        lights_(light_scene(data, tracer, seed)),
+        sources_(data.patches, lights_.radiosity),
+        triangles_(data.mesh.position.size(), [&](const auto& add) {
+          for (std::uint32_t t = 0; t < shown_patch.size(); ++t) {
+            if (shown_patch[t] == kNone) continue;
+            for (const std::uint32_t v : data.mesh.triangle[t]) add(v, t);
+          }
+        }) {}
+
+  ReceiverRows build(const Progress& progress) {
+    look_from_patches(part_of(progress, 0, kPatchShare));
+    const std::vector<std::uint32_t> order = vertex_order();
+    rows_.patch = sources_.tree.patch;
+    rows_.group_begin = {0};
+    set_of_cluster_.assign(sources_.tree.clusters.size(), kNone);
+    const Progress rest = part_of(progress, kPatchShare, 1);
+    constexpr std::size_t kBatch = kBatchGroups * kGroup;
+    for (std::size_t begin = 0; begin < order.size(); begin += kBatch) {
+      report_progress(rest, static_cast<double>(begin) / static_cast<double>(order.size()));
+      add_batch(std::span(order).subspan(begin, std::min(kBatch, order.size() - begin)));
+    }
+    return std::move(rows_);
+  }
+
+ private:
+  static constexpr double kPatchShare = 0.1;  // of the progress
+
+  /// The sets of a group and its values in them.
+  struct Group {
+    std::vector<std::uint32_t> clusters, vertices;
+    std::vector<float> scale;
+    std::vector<std::int8_t> value;
+  };
+
+  void look_from_patches(const Progress& progress) {
+    const std::size_t n = data_.patches.size();
+    const PatchTriangles triangles(data_.mesh.triangle_patch, n);
+    patch_rows_.resize(n);
+    ParallelProgress parallel(progress, n);
+#pragma omp parallel
+    {
+      ReceiverViewer viewer(data_.mesh, shown_patch_, n, tracer_, settings_.ray_count);
+#pragma omp for schedule(dynamic, 16)
+      for (std::size_t i = 0; i < n; ++i) {
+        if (parallel.stopped()) continue;
+        viewer.look_from_patch(triangles[i], patch_rows_[i]);
+        parallel.advance();
+      }
+    }
+    parallel.finish();
+  }
+
+  /// The vertices that show patches, neighbours after each other.
+  std::vector<std::uint32_t> vertex_order() const {
+    const DisplayMesh& mesh = data_.mesh;
+    std::vector<std::uint32_t> shown;
+    PatchTable places;
+    for (std::uint32_t v = 0; v < mesh.position.size(); ++v) {
+      if (mesh.weight_begin[v] == mesh.weight_begin[v + 1] || triangles_[v].empty()) continue;
+      shown.push_back(v);
+      places.area.push_back(1);
+      places.centroid.push_back(mesh.position[v]);
+      places.normal.push_back(mesh.normal[v]);
+    }
+    if (shown.empty()) return shown;
+    std::vector<std::uint32_t> order = build_cluster_tree(places, kGroup, kGroup).patch;
+    for (std::uint32_t& v : order) v = shown[v];
+    return order;
+  }
+
+  void add_batch(std::span<const std::uint32_t> vertices) {
+    std::vector<VertexRow> found(vertices.size());
+    const double cover = close_cover_height();
+#pragma omp parallel
+    {
+      ReceiverViewer viewer(data_.mesh, shown_patch_, data_.patches.size(), tracer_,
+                            settings_.ray_count);
+      std::vector<double> sum(data_.patches.size(), 0.0);
+#pragma omp for schedule(dynamic, 16)
+      for (std::size_t k = 0; k < vertices.size(); ++k) {
+        ViewRow row;
+        viewer.look_from_vertex(vertices[k], triangles_[vertices[k]], cover, row);
+        if (!row.empty()) found[k] = compare(vertices[k], row, sum);
+      }
+    }
+    std::vector<std::uint32_t> kept;
+    for (std::uint32_t k = 0; k < found.size(); ++k) {
+      if (found[k].gain > settings_.tolerance) kept.push_back(k);
+    }
+    std::vector<Group> groups((kept.size() + kGroup - 1) / kGroup);
+#pragma omp parallel for schedule(dynamic, 1)
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      const std::span<const std::uint32_t> all(kept);
+      const std::size_t first = g * kGroup;
+      groups[g] = make_group(vertices, found,
+                             all.subspan(first, std::min<std::size_t>(kGroup, all.size() - first)));
+    }
+    for (const Group& group : groups) append(group);
+  }
+
+  /// The row less those of the patches in the weights of the vertex. `sum` [n] is zero before and
+  /// after.
+  VertexRow compare(std::uint32_t vertex, const ViewRow& row, std::vector<double>& sum) const {
+    const DisplayMesh& mesh = data_.mesh;
+    VertexRow result;
+    std::vector<std::uint32_t> touched;
+    const auto add = [&](const ViewRow& from, double weight) {
+      for (const auto& [patch, part] : from) {
+        const std::uint32_t p = sources_.position[patch];
+        if (sum[p] == 0) touched.push_back(p);
+        sum[p] += weight * part;
+      }
+    };
+    result.light.setZero(lights_.usual.size());
+    add(row, 1);
+    for (std::uint32_t k = mesh.weight_begin[vertex]; k < mesh.weight_begin[vertex + 1]; ++k) {
+      add(patch_rows_[mesh.weight_patch[k]], -static_cast<double>(mesh.weight[k]));
+      result.light += mesh.weight[k] * lights_.irradiance.row(mesh.weight_patch[k]).transpose();
+    }
+    std::ranges::sort(touched);
+    Eigen::VectorXf added = Eigen::VectorXf::Zero(lights_.usual.size());
+    for (const std::uint32_t p : touched) {
+      if (sum[p] == 0) continue;
+      const auto part = static_cast<float>(sum[p]);
+      sum[p] = 0;
+      result.added.push_back({p, part});
+      added += part * sources_.light.row(p).transpose();
+    }
+    result.light = (result.light + added).cwiseMax(kDim * lights_.usual);
+    if (added.size() > 0) {
+      result.gain = std::sqrt(added.cwiseQuotient(result.light).squaredNorm() /
+                              static_cast<float>(added.size()));
+    }
+    return result;
+  }
+
+  GroupRows rows_of(std::span<const VertexRow> found, std::span<const std::uint32_t> kept) const {
+    GroupRows rows;
+    for (const std::uint32_t k : kept) {
+      for (const ViewEntry& entry : found[k].added) rows.position.push_back(entry.patch);
+    }
+    std::ranges::sort(rows.position);
+    const auto rest = std::ranges::unique(rows.position);
+    rows.position.erase(rest.begin(), rest.end());
+    rows.part.setZero(static_cast<Eigen::Index>(kept.size()),
+                      static_cast<Eigen::Index>(rows.position.size()));
+    rows.light.setZero(lights_.usual.size());
+    for (std::size_t i = 0; i < kept.size(); ++i) {
+      Eigen::Index column = 0;
+      for (const auto& [position, part] : found[kept[i]].added) {
+        while (rows.position[static_cast<std::size_t>(column)] != position) ++column;
+        rows.part(static_cast<Eigen::Index>(i), column) = part;
+      }
+      rows.light += found[kept[i]].light.cwiseAbs2();
+    }
+    rows.light = (rows.light / static_cast<float>(kept.size())).cwiseSqrt();
+    return rows;
+  }
+
+  Group make_group(std::span<const std::uint32_t> vertices, std::span<const VertexRow> found,
+                   std::span<const std::uint32_t> kept) const {
+    const GroupRows rows = rows_of(found, kept);
+    Group group;
+    for (const std::uint32_t k : kept) group.vertices.push_back(vertices[k]);
+    group.clusters =
+        choose_sets(sources_, rows, {settings_.tolerance, settings_.most_sets, kSinglePatchWeight});
+    round(parts_of_sets(rows, group.clusters), group);
+    return group;
+  }
+
+  /// The parts of the sets [receivers][sets] that the receivers of a group see more than by their
+  /// weights.
+  Eigen::MatrixXf parts_of_sets(const GroupRows& rows,
+                                std::span<const std::uint32_t> clusters) const {
+    Eigen::MatrixXf parts(rows.part.rows(), static_cast<Eigen::Index>(clusters.size()));
+    Eigen::Index first = 0;
+    for (Eigen::Index j = 0; j < parts.cols(); ++j) {
+      const Cluster& cluster = sources_.tree.clusters[clusters[static_cast<std::size_t>(j)]];
+      const auto end = std::ranges::lower_bound(rows.position, cluster.begin + cluster.count);
+      const Eigen::Index last = end - rows.position.begin();
+      parts.col(j) = rows.part.middleCols(first, last - first).rowwise().sum();
+      first = last;
+    }
+    return parts;
+  }
+
+  /// Rounds the parts of the sets to bytes.
+  void round(const Eigen::MatrixXf& parts, Group& group) const {
+    const auto sets = static_cast<std::size_t>(parts.cols());
+    const std::size_t padded = (sets + kSetStep - 1) / kSetStep * kSetStep;
+    group.value.assign(padded * kGroup, 0);
+    group.scale.assign(padded, 0.0F);
+    Eigen::MatrixXf rounded(parts.rows(), parts.cols());
+    for (Eigen::Index j = 0; j < parts.cols(); ++j) {
+      const float scale = parts.col(j).cwiseAbs().maxCoeff() / kLargestByte;
+      group.scale[static_cast<std::size_t>(j)] = scale;
+      rounded.col(j) = scale > 0 ? Eigen::VectorXf((parts.col(j) / scale).array().round())
+                                 : Eigen::VectorXf::Zero(parts.rows());
+    }
+    keep_sums(parts, group.scale, rounded);
+    for (std::size_t j = 0; j < sets; ++j) {
+      for (Eigen::Index i = 0; i < parts.rows(); ++i) {
+        group.value[ReceiverRows::value_index(j, static_cast<std::size_t>(i))] =
+            static_cast<std::int8_t>(rounded(i, static_cast<Eigen::Index>(j)));
+      }
+    }
+  }
+
+  /// Changes rounded values by 1 until the sum of each row is what it was, so that even light stays
+  /// exact. Sets with large scales come first; a value of 0 stays, since its receiver may not see
+  /// the set.
+  static void keep_sums(const Eigen::MatrixXf& parts, std::span<const float> scale,
+                        Eigen::MatrixXf& rounded) {
+    std::vector<Eigen::Index> order(static_cast<std::size_t>(parts.cols()));
+    std::iota(order.begin(), order.end(), Eigen::Index{0});
+    std::ranges::stable_sort(order, std::ranges::greater(),
+                             [&](Eigen::Index j) { return scale[static_cast<std::size_t>(j)]; });
+    for (Eigen::Index i = 0; i < parts.rows(); ++i) {
+      double missing = 0;
+      for (const Eigen::Index j : order) {
+        missing += static_cast<double>(parts(i, j)) -
+                   static_cast<double>(scale[static_cast<std::size_t>(j)]) * rounded(i, j);
+      }
+      for (const Eigen::Index j : order) {
+        const float step = scale[static_cast<std::size_t>(j)];
+        const float changed = rounded(i, j) + (missing > 0 ? 1.0F : -1.0F);
+        if (std::abs(missing) <= 0.5 * step || rounded(i, j) == 0 ||
+            std::abs(changed) > kLargestByte) {
+          continue;
+        }
+        rounded(i, j) = changed;
+        missing -= missing > 0 ? step : -step;
+      }
+    }
+  }
+
+  void append(const Group& group) {
+    if (group.clusters.empty()) return;
+    for (std::size_t j = 0; j < group.scale.size(); ++j) {
+      const std::uint32_t cluster = group.clusters[std::min(j, group.clusters.size() - 1)];
+      if (set_of_cluster_[cluster] == kNone) {
+        set_of_cluster_[cluster] = static_cast<std::uint32_t>(rows_.set.size());
+        const Cluster& range = sources_.tree.clusters[cluster];
+        rows_.set.push_back({range.begin, range.begin + range.count});
+      }
+      rows_.entry_set.push_back(set_of_cluster_[cluster]);
+    }
+    rows_.scale.insert(rows_.scale.end(), group.scale.begin(), group.scale.end());
+    rows_.value.insert(rows_.value.end(), group.value.begin(), group.value.end());
+    rows_.vertex.insert(rows_.vertex.end(), group.vertices.begin(), group.vertices.end());
+    rows_.group_begin.push_back(static_cast<std::uint32_t>(rows_.entry_set.size()));
+    rows_.vertex.resize(std::size_t{kGroup} * rows_.group_count(), kNone);
+  }
+
+  double close_cover_height() const {
+    const double whole = std::accumulate(data_.patches.area.begin(), data_.patches.area.end(), 0.0);
+    return kCloseCover * std::sqrt(whole / static_cast<double>(data_.patches.size()));
+  }
+
+  const TransferData& data_;
+  std::span<const std::uint32_t> shown_patch_;
+  const RayTracer& tracer_;
+  const ReceiverRowSettings& settings_;
+  const Lights lights_;
+  const ReceiverSources sources_;
+  const Grouped<std::uint32_t> triangles_;  ///< of each vertex, those that show a patch
+  std::vector<ViewRow> patch_rows_;         ///< [n]
+  std::vector<std::uint32_t> set_of_cluster_;
+  ReceiverRows rows_;
+};
+
+}  // namespace
+
+ReceiverRows make_receiver_rows(const TransferData& data,
+                                std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
+                                const ReceiverRowSettings& settings, std::uint64_t seed,
+                                const Progress& progress) {
+  if (settings.ray_count < kFewestVertexRays) {
+    throw Error("rows of receivers: a vertex needs at least 64 rays");
+  }
+  if (!(settings.tolerance >= 0) || settings.most_sets < kSetStep ||
+      settings.most_sets > ReceiverRows::kMostSets) {
+    throw Error("rows of receivers: the tolerance must be at least 0, the sets from 4 to 1024");
+  }
+  if (!data.transfer) throw Error("rows of receivers need an operator; make one");
+  return RowBuilder(data, shown_patch, tracer, settings, seed).build(progress);
+}
+
+}  // namespace rebounce

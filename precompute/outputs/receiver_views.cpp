@@ -1,0 +1,153 @@
+#include "precompute/outputs/receiver_views.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/glm.hpp>
+
+#include "precompute/sampling/hemisphere_rays.h"
+#include "runtime/rays/cumulative_choice.h"
+#include "runtime/rays/float3_glm.h"
+#include "runtime/rays/sampling.h"
+#include "runtime/rays/triangle.h"
+
+namespace rebounce {
+namespace {
+
+// All places have the same sequences: where neighbours see the same, their rows are the same.
+constexpr glm::dvec2 kPlaceShift{0.25, 0.75}, kDirectionShift{0.5, 0.5};
+
+// How much of the dual function is in the weights of a vertex; the rest is the hat function.
+constexpr double kDualPart = 0.75;  // lab/109
+
+// A cover faces what it covers: the cosine between their normals is below this.
+constexpr double kFacing = -0.7;
+
+// If less than this part of a vertex's surface is open, it counts as hidden.
+constexpr double kLeastOpen = 0.125;
+
+/// Points on the triangles around a vertex, evenly by area.
+class RingPoints {
+ public:
+  RingPoints(const DisplayMesh& mesh, std::uint32_t vertex,
+             std::span<const std::uint32_t> triangles)
+      : mesh_(mesh), vertex_(vertex), triangles_(triangles) {
+    for (const std::uint32_t t : triangles) choice_.add(area_of(corners_of(mesh, t)));
+  }
+
+  bool empty() const { return !(choice_.total() > 0); }
+
+  /// Returns a point, and writes the height of the vertex's hat function there.
+  PatchPoint at(const glm::dvec2& square, double& height) const {
+    const auto [index, rest] = choice_.choose(square.x);
+    const std::uint32_t t = triangles_[index];
+    const TriangleCorners p = corners_of(mesh_, t);
+    std::size_t own = 0;
+    while (mesh_.triangle[t][own] != vertex_) ++own;
+    const double away = std::sqrt(rest);
+    height = 1 - away;
+    const glm::dvec3 far = glm::mix(p[(own + 1) % 3], p[(own + 2) % 3], square.y);
+    return {to_float3(glm::mix(p[own], far, away)), to_float3(front_normal(p))};
+  }
+
+ private:
+  const DisplayMesh& mesh_;
+  std::uint32_t vertex_;
+  std::span<const std::uint32_t> triangles_;
+  CumulativeChoice choice_;
+};
+
+}  // namespace
+
+ReceiverViewer::ReceiverViewer(const DisplayMesh& mesh, std::span<const std::uint32_t> shown_patch,
+                               std::size_t patch_count, const RayTracer& tracer, int ray_count)
+    : mesh_(mesh),
+      shown_patch_(shown_patch),
+      tracer_(tracer),
+      point_(static_cast<std::size_t>(ray_count)),
+      height_(point_.size()),
+      ray_(point_.size()),
+      hit_(point_.size()),
+      sum_(patch_count, 0.0) {}
+
+void ReceiverViewer::trace() {
+  make_hemisphere_rays(point_, tracer_, kDirectionShift, ray_);
+  tracer_.intersect(ray_, hit_);
+  for (std::size_t k = 0; k < ray_.size(); ++k) {
+    prefer_lit_side(mesh_, tracer_, ray_[k], hit_[k], scratch_);
+  }
+}
+
+void ReceiverViewer::add(std::uint32_t patch, double part) {
+  if (patch == kNone) return;
+  if (sum_[patch] == 0) touched_.push_back(patch);
+  sum_[patch] += part;
+}
+
+void ReceiverViewer::take(ViewRow& row) {
+  std::ranges::sort(touched_);
+  row.clear();
+  for (const std::uint32_t patch : touched_) {
+    if (sum_[patch] != 0) row.push_back({patch, static_cast<float>(sum_[patch])});
+    sum_[patch] = 0;
+  }
+  touched_.clear();
+}
+
+void ReceiverViewer::look_from_patch(std::span<const std::uint32_t> triangles, ViewRow& row) {
+  spread_points(mesh_, triangles, kPlaceShift, point_);
+  trace();
+  for (const Hit& hit : hit_) {
+    add(patch_at(mesh_, shown_patch_, hit), 1 / static_cast<double>(hit_.size()));
+  }
+  take(row);
+}
+
+bool ReceiverViewer::is_hidden(std::size_t ray, double cover) const {
+  const Hit& hit = hit_[ray];
+  if (hit.triangle == kNone) return false;
+  if (meets_back(mesh_, hit)) return true;
+  const glm::dvec3 normal = to_dvec3(point_[ray].normal);
+  if (glm::dot(normal, to_dvec3(ray_[ray].direction)) * hit.t >= cover) return false;
+  const glm::dvec3 other = front_normal(corners_of(mesh_, hit.triangle));
+  return glm::dot(normal, hit.front ? other : -other) < kFacing;
+}
+
+// The dual functions of the hat functions h_v over the triangles around v are 4 h_v - 1: their
+// product with h_w has the mean 0 over each triangle unless w is v. A value that is the mean of the
+// light with the weight 3 (4 h_v - 1) is therefore exact for light that is linear over triangles
+// (B. Wohlmuth, "A mortar finite element method using dual spaces for the Lagrange multiplier",
+// 2000). The mean with the hat function itself, 3 h_v, flattens the light and is less noisy.
+void ReceiverViewer::look_from_vertex(std::uint32_t vertex,
+                                      std::span<const std::uint32_t> triangles, double cover,
+                                      ViewRow& row) {
+  row.clear();
+  const RingPoints ring(mesh_, vertex, triangles);
+  if (ring.empty()) return;
+  const PointSequence places = r2_sequence(kPlaceShift);
+  for (std::uint32_t k = 0; k < point_.size(); ++k) point_[k] = ring.at(places[k], height_[k]);
+  trace();
+  std::vector<bool> hidden(ray_.size());
+  double all = 0, open = 0, dual = 0;
+  const auto dual_of = [](double height) { return kDualPart * (3 * height - 1); };
+  for (std::size_t k = 0; k < ray_.size(); ++k) {
+    hidden[k] = is_hidden(k, cover);
+    all += height_[k];
+    if (!hidden[k]) open += height_[k];
+  }
+  if (open < kLeastOpen * all) {
+    hidden.assign(ray_.size(), false);
+    open = all;
+  }
+  for (std::size_t k = 0; k < ray_.size(); ++k) {
+    if (!hidden[k]) dual += dual_of(height_[k]);
+  }
+  // What the dual function adds has the sum 0 also where a part is left out.
+  for (std::size_t k = 0; k < ray_.size(); ++k) {
+    if (hidden[k]) continue;
+    const double weight = height_[k] * (1 - dual / open) + dual_of(height_[k]);
+    add(patch_at(mesh_, shown_patch_, hit_[k]), weight / open);
+  }
+  take(row);
+}
+
+}  // namespace rebounce

@@ -1,0 +1,59 @@
+#pragma once
+
+// What patches and vertices of the display mesh see, along rays.
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "precompute/patches/hit_patch.h"
+#include "runtime/rays/patch_points.h"
+#include "runtime/rays/ray_tracer.h"
+#include "transfer/base/grouped.h"
+
+namespace rebounce {
+
+/// A sparse row: with radiosities B in lx the light at a place is the sum of part x B[patch], in
+/// lx.
+struct ViewEntry {
+  std::uint32_t patch;
+  float part;
+};
+using ViewRow = std::vector<ViewEntry>;  ///< by ascending patch
+
+/// Finds rows of places on a mesh, one after the other. The same place gives the same row.
+class ReceiverViewer {
+ public:
+  /// `shown_patch` [t] is that of PatchModel; patches are below `patch_count`. All must outlive it.
+  ReceiverViewer(const DisplayMesh& mesh, std::span<const std::uint32_t> shown_patch,
+                 std::size_t patch_count, const RayTracer& tracer, int ray_count);
+
+  /// The mean over a patch of `triangles`.
+  void look_from_patch(std::span<const std::uint32_t> triangles, ViewRow& row);
+
+  /// The value that the light on the `triangles` around a vertex gives it: that of the linear
+  /// function over each of them which is nearest to the light there. What lies close above hides
+  /// the surface, and what is hidden is left out; if nearly all is hidden, nothing is. `cover` is
+  /// the height in metres below which something is close.
+  void look_from_vertex(std::uint32_t vertex, std::span<const std::uint32_t> triangles,
+                        double cover, ViewRow& row);
+
+ private:
+  void trace();
+  bool is_hidden(std::size_t ray, double cover) const;
+  void add(std::uint32_t patch, double part);
+  void take(ViewRow& row);
+
+  const DisplayMesh& mesh_;
+  std::span<const std::uint32_t> shown_patch_;
+  const RayTracer& tracer_;
+  std::vector<PatchPoint> point_;  ///< [rays]
+  std::vector<double> height_;     ///< [rays] of the vertex's hat function where they begin
+  std::vector<Ray> ray_;
+  std::vector<Hit> hit_;
+  std::vector<double> sum_;             ///< [n] of the row that is made
+  std::vector<std::uint32_t> touched_;  ///< patches of which it may have something
+  CoincidenceScratch scratch_;
+};
+
+}  // namespace rebounce

@@ -1,0 +1,212 @@
+#include "precompute/outputs/receiver_rows.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "precompute/build/transfer_build.h"
+#include "precompute/outputs/receiver_sets.h"
+#include "rebounce/outputs.h"
+#include "runtime/outputs/vertex_light.h"
+#include "runtime/rays/triangle.h"
+#include "tests/support/allocation_counter.h"
+#include "tests/support/brute_force.h"
+#include "tests/support/expect_error.h"
+#include "tests/support/test_scenes.h"
+#include "tests/support/with_threads.h"
+
+namespace rebounce::test_receiver_rows {
+namespace {
+
+/// A room with a shelf of nine boxes close to each other, all smaller than its patches.
+Scene room_of_small_things() {
+  Scene scene = test::empty_scene({0.5F, 0.6F, 0.7F});
+  test::add_box(scene, {0, 0, 0}, {3, 2.5, 4}, true);
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < 3; ++k) {
+      const glm::dvec3 low(1 + 0.3 * i, 0.8, 1.2 + 0.3 * k);
+      test::add_box(scene, low, low + glm::dvec3(0.2, 0.15 + 0.1 * ((i + k) % 3), 0.2), false);
+    }
+  }
+  return scene;
+}
+
+TransferData build(bool with_rows, double tolerance = 0.01) {
+  BuildSettings settings;
+  settings.subdivision.patch_count = 250;
+  settings.receiver_rows.at_vertices = with_rows;
+  settings.receiver_rows.ray_count = 512;
+  settings.receiver_rows.tolerance = tolerance;
+  BuildReport report;
+  return build_transfer_data(room_of_small_things(), settings, report);
+}
+
+const std::shared_ptr<const TransferData>& room() {
+  static const auto data = std::make_shared<const TransferData>(build(true));
+  return data;
+}
+
+Light lamp() {
+  Light light;
+  light.position = {0.4F, 1.9F, 0.5F};
+  light.intensity = 100;
+  return light;
+}
+
+/// The error of values at vertices, interpolated in the middles of triangles, against rays that
+/// bring the radiosity of the patches they meet.
+double error_against_rays(const Engine& engine, std::span<const Float3> at_vertices) {
+  const DisplayMesh& mesh = engine.data().mesh;
+  double off = 0, all = 0;
+  for (std::uint32_t t = 0; t < mesh.surface_count(); ++t) {
+    if (mesh.triangle_patch[t] == kNone) continue;
+    const TriangleCorners corners = corners_of(mesh, t);
+    const Float3 normal = to_float3(front_normal(corners));
+    const Float3 middle = to_float3((corners[0] + corners[1] + corners[2]) / 3.0);
+    const glm::dvec3 truth = test::irradiance_at(
+        engine, engine.parts().tracer->offset_point(middle, normal), normal, 1024);
+    glm::dvec3 shown(0);
+    for (const std::uint32_t v : mesh.triangle[t]) shown += to_dvec3(at_vertices[v]) / 3.0;
+    off += area_of(corners) * glm::dot(shown - truth, shown - truth);
+    all += area_of(corners) * glm::dot(truth, truth);
+  }
+  return std::sqrt(off / all);
+}
+
+TEST(ReceiverRows, AreNearerToRaysThanWeights) {
+  Engine engine(room());
+  const Light light = lamp();
+  engine.relight({&light, 1}, {});
+  std::vector<Float3> rows(room()->mesh.position.size()), weights = rows;
+  vertex_irradiance(engine, rows);
+  light_at_vertices(room()->mesh, engine.indirect_irradiance(), weights);
+  const double with_rows = error_against_rays(engine, rows);
+  const double with_weights = error_against_rays(engine, weights);
+  std::printf("relative L2 error: %.4f with rows, %.4f with weights\n", with_rows, with_weights);
+  EXPECT_LT(with_rows, 0.7 * with_weights);
+}
+
+TEST(ReceiverRows, AddNothingUnderEvenLight) {
+  const ReceiverRows& rows = room()->receiver_rows;
+  ASSERT_GT(rows.group_count(), 0U);
+  const std::vector<Float3> even(room()->patches.size(), Float3{1, 1, 1});
+  std::vector<Float3> added(room()->mesh.position.size(), Float3{0, 0, 0});
+  ReceiverProducts(rows, room()->patches.area).add(even, added);
+  for (const Float3& a : added) EXPECT_NEAR(a[0], 0, 1e-3);
+}
+
+TEST(ReceiverRows, ChangeNothingElse) {
+  const TransferData without = build(false);
+  EXPECT_TRUE(without.receiver_rows.empty());
+  EXPECT_EQ(without.mesh.weight, room()->mesh.weight);
+  EXPECT_EQ(without.patches.area, room()->patches.area);
+  // At patches alone, vertices show what the operator gives, by their weights.
+  const auto plain = std::make_shared<const TransferData>(without);
+  Engine engine(plain), other(room());
+  const Light light = lamp();
+  engine.relight({&light, 1}, {});
+  other.relight({&light, 1}, {});
+  EXPECT_TRUE(std::ranges::equal(engine.radiosity(), other.radiosity()));
+  std::vector<Float3> shown(plain->mesh.position.size()), weighted = shown;
+  vertex_irradiance(engine, shown);
+  light_at_vertices(plain->mesh, engine.indirect_irradiance(), weighted);
+  EXPECT_EQ(shown, weighted);
+}
+
+TEST(ReceiverRows, AreTheSameOnAnyNumberOfThreads) {
+  const TransferData again = test::with_threads(1, [] { return build(true); });
+  const TransferData more = test::with_threads(4, [] { return build(true); });
+  EXPECT_EQ(again.receiver_rows.value, more.receiver_rows.value);
+  EXPECT_EQ(again.receiver_rows.scale, more.receiver_rows.scale);
+  EXPECT_EQ(again.receiver_rows.vertex, more.receiver_rows.vertex);
+  EXPECT_EQ(again.receiver_rows.entry_set, more.receiver_rows.entry_set);
+  EXPECT_EQ(again.receiver_rows.set, more.receiver_rows.set);
+}
+
+TEST(ReceiverRows, AFrameWithThemDoesNotAllocate) {
+  Engine engine(room());
+  const Light light = lamp();
+  std::vector<Float3> shown(room()->mesh.position.size());
+  engine.relight({&light, 1}, {});
+  EXPECT_EQ(test::count_allocations([&] {
+              engine.relight({&light, 1}, {});
+              vertex_irradiance(engine, shown);
+            }),
+            0);
+}
+
+TEST(ReceiverRows, AreOnlyStoredWhereTheyAddMoreThanTheTolerance) {
+  EXPECT_EQ(build(true, 10).receiver_rows.group_count(), 0U);
+}
+
+TEST(ReceiverRows, RefuseWhatCannotBe) {
+  const TransferData data = build(false);
+  const RayTracer tracer = make_surface_tracer(data.mesh);
+  const auto make = [&](const TransferData& from, const ReceiverRowSettings& settings) {
+    make_receiver_rows(from, from.mesh.triangle_patch, tracer, settings, 1);
+  };
+  test::expect_error([&] { make(data, {.ray_count = 63}); }, "at least 64 rays");
+  test::expect_error([&] { make(data, {.tolerance = -1}); }, "tolerance");
+  test::expect_error([&] { make(data, {.tolerance = NAN}); }, "tolerance");
+  test::expect_error([&] { make(data, {.most_sets = 3}); }, "from 4");
+  test::expect_error([&] { make(data, {.most_sets = 1025}); }, "1024");
+  TransferData without = data;
+  without.transfer = nullptr;
+  test::expect_error([&] { make(without, {}); }, "need an operator");
+}
+
+/// Patches of a strip, and receivers that see some of them.
+struct Strip {
+  PatchTable patches;
+  GroupRows rows;
+  std::vector<std::vector<Float3>> light;
+
+  Strip() {
+    for (int i = 0; i < 64; ++i) {
+      patches.area.push_back(1);
+      patches.centroid.push_back({static_cast<float>(i), 0, 0});
+      patches.normal.push_back({0, 1, 0});
+      patches.reflectance.push_back({0.5F, 0.5F, 0.5F});
+    }
+    light.assign(1, std::vector<Float3>(64, Float3{1, 1, 1}));
+    for (std::uint32_t p = 0; p < 64; p += 2) rows.position.push_back(p);
+    rows.part.setConstant(4, 32, 0.01F);
+    rows.part.row(1) *= -1;
+    rows.part(2, 5) = 0.3F;
+    rows.light.setOnes(1);
+  }
+};
+
+TEST(ReceiverSets, CoverWhatIsSeenOnce) {
+  const Strip strip;
+  const ReceiverSources sources(strip.patches, strip.light);
+  for (const std::uint32_t most : {4U, 9U, 64U}) {
+    const auto sets = choose_sets(sources, strip.rows, {0, most, 1});
+    EXPECT_LE(sets.size(), most);
+    std::vector<int> covered(64, 0);
+    std::uint32_t end = 0;
+    for (const std::uint32_t s : sets) {
+      const Cluster& cluster = sources.tree.clusters[s];
+      EXPECT_GE(cluster.begin, end);
+      end = cluster.begin + cluster.count;
+      for (std::uint32_t p = cluster.begin; p < end; ++p) ++covered[p];
+    }
+    for (const std::uint32_t p : strip.rows.position) EXPECT_EQ(covered[p], 1);
+  }
+}
+
+TEST(ReceiverSets, SinglePatchesWithLargeDifferencesGetSetsOfTheirOwn) {
+  const Strip strip;
+  const ReceiverSources sources(strip.patches, strip.light);
+  // Even light alone shows no need of it: no set errs.
+  EXPECT_EQ(choose_sets(sources, strip.rows, {1e-6, 16, 0}).size(), 1U);
+  const auto sets = choose_sets(sources, strip.rows, {0, 16, 1});
+  const auto is_alone = [&](std::uint32_t s) {
+    return sources.tree.clusters[s].begin == strip.rows.position[5] &&
+           sources.tree.clusters[s].count == 1;
+  };
+  EXPECT_TRUE(std::ranges::any_of(sets, is_alone));
+}
+
+}  // namespace
+}  // namespace rebounce::test_receiver_rows
