@@ -72,17 +72,22 @@ Replicates root_of_pairs(const Product& product) {
   return result;
 }
 
-/// The error of each light, relative to `reference`(light).
+/// The error of each light, relative to `reference`(light). What spreads the error along links
+/// instead of F changes it by about the error as a part of itself, which adds its square to the
+/// half width of the confidence interval.
 template <typename Reference>
 SampledError error_over_lights(const std::vector<Replicates>& lights, const Reference& reference) {
   Replicates sum, largest;
+  double squares = 0;
   for (std::size_t k = 0; k < lights.size(); ++k) {
     Replicates relative;
     relative.add(lights[k], 1 / reference(k));
     sum.add(relative, 1 / static_cast<double>(lights.size()));
+    squares += relative.all * relative.all / static_cast<double>(lights.size());
     if (relative.all > largest.all) largest = relative;
   }
-  return {sum.all, sum.confidence(), largest.all, largest.confidence()};
+  return {sum.all, std::hypot(sum.confidence(), squares), largest.all,
+          std::hypot(largest.confidence(), largest.all * largest.all)};
 }
 
 /// `count` of `all` numbers, one in each of as many equal runs.

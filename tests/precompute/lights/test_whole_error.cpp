@@ -40,15 +40,15 @@ class WholeErrorOfRoom : public testing::Test {
     test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
     test::add_box(scene, {1, 0, 1}, {2, 1.2, 2.5}, false);
     PatchModel model = make_patch_model(scene, {.patch_count = 300});
-    tracer_ = test::make_tracer(model);
+    tracer_.emplace(test::make_tracer(model));
     FormFactorSettings settings;
-    FormFactors pairs = compute_form_factors(model, tracer_, settings);
+    FormFactors pairs = compute_form_factors(model, *tracer_, settings);
     settings.link_epsilon = kCoarseLinks;
-    const FormFactorLinks links = build_links(model, tracer_, settings).links;
+    const FormFactorLinks links = build_links(model, *tracer_, settings).links;
     shown_patch_ = model.shown_patch;
     data_ = test::data_of(std::move(model), pairs);
     reference_.emplace(links, data_.patches);
-    lights_ = random_initial_exitances(data_, tracer_, LightKind::kPoint, kLights, kSeed);
+    lights_ = random_initial_exitances(data_, *tracer_, LightKind::kPoint, kLights, kSeed);
     of_links_ = reference_->indirect_irradiances(lights_);
     of_pairs_ = ReferenceSolver(pairs.exchange, data_.patches).indirect_irradiances(lights_);
   }
@@ -63,7 +63,7 @@ class WholeErrorOfRoom : public testing::Test {
       roles.keep(PatchRoles::kReceiver, received);
       estimator.add(lights_[k], truth[k], received);
     }
-    return estimator.estimate(shown_patch_, tracer_, *reference_);
+    return estimator.estimate(shown_patch_, *tracer_, *reference_);
   }
 
   /// Means of the errors of `light` against all pairs.
@@ -86,7 +86,7 @@ class WholeErrorOfRoom : public testing::Test {
     return result;
   }
 
-  RayTracer tracer_;
+  std::optional<RayTracer> tracer_;
   TransferData data_;
   std::vector<std::uint32_t> shown_patch_;
   std::optional<ReferenceSolver> reference_;
@@ -148,8 +148,9 @@ TEST_F(WholeErrorOfRoom, HasTheSameBitsForAnyThreadsAndStopsWhenAsked) {
   EXPECT_EQ(one.whole.max, three.whole.max);
   WholeErrorEstimator estimator(data_, {}, kSeed, {});
   estimator.add(lights_[0], of_links_[0], of_links_[0]);
-  EXPECT_THROW(estimator.estimate(shown_patch_, tracer_, *reference_, [](double) { return false; }),
-               Cancelled);
+  EXPECT_THROW(
+      estimator.estimate(shown_patch_, *tracer_, *reference_, [](double) { return false; }),
+      Cancelled);
 }
 
 }  // namespace
