@@ -1,6 +1,7 @@
 #include "precompute/build/build_estimate.h"
 
 #include <fmt/format.h>
+#include <omp.h>
 
 #include <algorithm>
 #include <cmath>
@@ -44,8 +45,11 @@ constexpr std::size_t kVertexBytes = 400, kWeighedBytes = 3000, kWeighedOfPatch 
 constexpr std::size_t kLibraryBytes = 2'000'000, kLibraryBytesOfPatch = 12'000,
                       kMostLibraryBytes = 12'000'000;
 
+// What each thread but the first takes beside that.
+constexpr std::size_t kThreadBytesOfPatch = 5'000, kMostThreadBytes = 10'000'000;
+
 // Copies of the factors of a low-rank operator while they are found.
-constexpr std::size_t kFactorCopies = 8;
+constexpr std::size_t kFactorCopies = 6;
 
 // A link during refinement: the link, its copy, and the flat arrays.
 constexpr std::size_t kLinkBytesFound = 100;
@@ -85,6 +89,12 @@ std::uint64_t bytes_beside_transfer(const LinkedBuild& build) {
 std::size_t usual_link_count(std::size_t patch_count) {
   const auto n = static_cast<double>(patch_count);
   return static_cast<std::size_t>(kLinksOfPatch * std::cbrt(n) * n);
+}
+
+std::uint64_t bytes_of_libraries(std::size_t patch_count) {
+  const auto others = static_cast<std::size_t>(omp_get_max_threads()) - 1;
+  return std::min(kMostLibraryBytes, kLibraryBytes + kLibraryBytesOfPatch * patch_count) +
+         others * std::min(kMostThreadBytes, kThreadBytesOfPatch * patch_count);
 }
 
 std::uint64_t bytes_of_weights(const BuiltScene& scene) {
@@ -128,9 +138,7 @@ std::uint64_t peak_bytes_of_pairs(const BuiltScene& scene, std::size_t matrix_co
   const std::uint64_t n = scene.patch_count, pairs = n * n / 4;
   const std::uint64_t found = kPairBytesMade * pairs + kPatchBytesOfPairs * n +
                               kMicroTriangleBytes * scene.micro_triangle_count;
-  const std::uint64_t libraries =
-      std::min(kMostLibraryBytes, kLibraryBytes + kLibraryBytesOfPatch * scene.patch_count);
-  const std::uint64_t before = resident_memory_bytes() + libraries;
+  const std::uint64_t before = resident_memory_bytes() + bytes_of_libraries(scene.patch_count);
   const std::uint64_t most = std::max(found, kEntryBytes * pairs + bytes_of_weights(scene));
   if (kind == OperatorKind::kNoOperator) return before + most;
   const std::uint64_t inverses =

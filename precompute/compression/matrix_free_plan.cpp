@@ -24,7 +24,7 @@ constexpr double kOperatorBytes = 8.4e3, kOperatorGrowth = 0.4;
 
 // Of a patch while a dense operator is compressed, beside the lights: candidates of the search and
 // the light that they are judged by; blocks that are at work, at most so much (lab/114).
-constexpr std::size_t kSearchBytes = 7000, kWorkBytes = 16000, kMostWorkBytes = 12'000'000;
+constexpr std::size_t kSearchBytes = 7000, kWorkBytes = 16000, kMostWorkBytes = 8'000'000;
 
 }  // namespace
 
