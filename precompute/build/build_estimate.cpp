@@ -111,8 +111,8 @@ std::uint64_t memory_limit_bytes(const BuildSettings& settings) {
 
 BuiltScene built_scene(std::size_t patch_count, const DisplayMesh& mesh) {
   BuiltScene scene{patch_count, mesh.position.size(), 0};
-  for (const std::uint32_t map : mesh.opacity.triangle_map) {
-    if (map != kNone) scene.micro_triangle_count += mesh.opacity.map(map).size();
+  for (std::uint32_t t = 0; t < mesh.surface_count(); ++t) {
+    scene.micro_triangle_count += mesh.opacity.of_triangle(t).size();
   }
   return scene;
 }
