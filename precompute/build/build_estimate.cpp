@@ -198,13 +198,10 @@ void sample_pairs(const PatchModel& model, const RayTracer& tracer, const BuildS
                               arithmetic_of(decided.operator_kind));
 }
 
-CostEstimate estimate_after_links(const PatchModel& model, std::size_t link_count,
-                                  const PatchRoles& roles, const BuildSettings& decided) {
-  const LinkedBuild build = linked_build(built_scene(model.patches.size(), model.mesh), link_count,
-                                         model.patches.reflectance, roles, decided.tolerance);
-  CostEstimate estimate = estimate_of(build.scene.patch_count, roles);
-  estimate.link_count = link_count;
-  estimate.peak_bytes = peak_bytes_after_links(build, decided.memory_limit_bytes);
+CostEstimate estimate_after_links(const LinkedBuild& build, std::uint64_t limit_bytes) {
+  CostEstimate estimate = estimate_of(build.scene.patch_count, build.roles);
+  estimate.link_count = build.link_count;
+  estimate.peak_bytes = peak_bytes_after_links(build, limit_bytes);
   return estimate;
 }
 

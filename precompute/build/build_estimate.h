@@ -70,8 +70,7 @@ void sample_pairs(const PatchModel& model, const RayTracer& tracer, const BuildS
                   const Progress& progress, CostEstimate& estimate);
 
 /// The memory of the stages after links, once their number is known.
-CostEstimate estimate_after_links(const PatchModel& model, std::size_t link_count,
-                                  const PatchRoles& roles, const BuildSettings& decided);
+CostEstimate estimate_after_links(const LinkedBuild& build, std::uint64_t limit_bytes);
 
 /// Throws Error if an estimate is above `limit_bytes`.
 void refuse_if_too_large(const CostEstimate& estimate, std::uint64_t limit_bytes,
