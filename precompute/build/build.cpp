@@ -106,8 +106,13 @@ class TransferBuild {
     const auto find = links ? find_links : find_pairs;
     EscapedLight escaped = find(model_, *tracer_, decided_, data_, report_, clock_);
     if (links && decided_.operator_kind != OperatorKind::kNoOperator) {
-      announce(report_.estimate_after_links.emplace(
-          estimate_after_links(model_, report_.link_count, roles_, decided_)));
+      LinkedBuild build =
+          linked_build(built_scene(model_.patches.size(), model_.mesh), report_.link_count,
+                       model_.patches.reflectance, roles_, decided_.tolerance);
+      build.row_bytes = bytes_of_receiver_rows(model_, decided_.receiver_rows);
+      std::uint64_t& limit = decided_.memory_limit_bytes;
+      announce(report_.estimate_after_links.emplace(estimate_after_links(build, limit)));
+      limit -= std::min(limit - 1, build.held_bytes);  // what is left for the other stages
     }
     data_.patches = std::move(model_.patches);
     data_.patches.sky_visibility = std::move(escaped.sky_visibility);

@@ -102,7 +102,8 @@ std::uint64_t bytes_of_weights(const BuiltScene& scene) {
          kWeighedBytes * std::min(scene.vertex_count, kWeighedOfPatch * scene.patch_count);
 }
 
-/// Rows of vertices: of the patches, as sparse as rays leave them, and twice what is stored.
+}  // namespace
+
 std::uint64_t bytes_of_receiver_rows(const PatchModel& model, const ReceiverRowSettings& rows) {
   if (!rows.at_vertices) return 0;
   const std::uint64_t n = model.patches.size(), rays = static_cast<std::uint64_t>(rows.ray_count);
@@ -110,16 +111,14 @@ std::uint64_t bytes_of_receiver_rows(const PatchModel& model, const ReceiverRowS
          4 * std::uint64_t{rows.most_sets} * model.mesh.position.size();
 }
 
-}  // namespace
-
 std::uint64_t memory_limit_bytes(const BuildSettings& settings) {
   return settings.memory_limit_bytes > 0 ? settings.memory_limit_bytes : machine_memory_bytes() / 2;
 }
 
 BuiltScene built_scene(std::size_t patch_count, const DisplayMesh& mesh) {
   BuiltScene scene{patch_count, mesh.position.size(), 0};
-  for (const std::uint32_t map : mesh.opacity.triangle_map) {
-    if (map != kNone) scene.micro_triangle_count += mesh.opacity.map(map).size();
+  for (std::uint32_t t = 0; t < mesh.surface_count(); ++t) {
+    scene.micro_triangle_count += mesh.opacity.of_triangle(t).size();
   }
   return scene;
 }
@@ -208,14 +207,10 @@ void sample_pairs(const PatchModel& model, const RayTracer& tracer, const BuildS
                               arithmetic_of(decided.operator_kind));
 }
 
-CostEstimate estimate_after_links(const PatchModel& model, std::size_t link_count,
-                                  const PatchRoles& roles, const BuildSettings& decided) {
-  const LinkedBuild build = linked_build(built_scene(model.patches.size(), model.mesh), link_count,
-                                         model.patches.reflectance, roles, decided.tolerance);
-  CostEstimate estimate = estimate_of(build.scene.patch_count, roles);
-  estimate.link_count = link_count;
-  estimate.peak_bytes = peak_bytes_after_links(build, decided.memory_limit_bytes) +
-                        bytes_of_receiver_rows(model, decided.receiver_rows);
+CostEstimate estimate_after_links(const LinkedBuild& build, std::uint64_t limit_bytes) {
+  CostEstimate estimate = estimate_of(build.scene.patch_count, build.roles);
+  estimate.link_count = build.link_count;
+  estimate.peak_bytes = peak_bytes_after_links(build, limit_bytes) + build.row_bytes;
   return estimate;
 }
 

@@ -25,6 +25,10 @@ struct BuiltScene {
   std::size_t micro_triangle_count = 0;  ///< of triangles with opacity maps
 };
 
+/// Of rows of vertices while they are found: those of the patches, as sparse as rays leave them,
+/// and twice what is stored.
+std::uint64_t bytes_of_receiver_rows(const PatchModel& model, const ReceiverRowSettings& rows);
+
 /// Those of patches and their mesh.
 BuiltScene built_scene(std::size_t patch_count, const DisplayMesh& mesh);
 
@@ -42,6 +46,7 @@ struct LinkedBuild {
   std::uint32_t matrix_count = 1;  ///< distinct reflectance channels
   PatchRoles roles{};
   double tolerance = kDefaultTolerance;  ///< of the operator
+  std::uint64_t row_bytes = 0;           ///< of rows of vertices, which are found last
 };
 
 /// Of a model whose links are known and in memory.
@@ -70,8 +75,7 @@ void sample_pairs(const PatchModel& model, const RayTracer& tracer, const BuildS
                   const Progress& progress, CostEstimate& estimate);
 
 /// The memory of the stages after links, once their number is known.
-CostEstimate estimate_after_links(const PatchModel& model, std::size_t link_count,
-                                  const PatchRoles& roles, const BuildSettings& decided);
+CostEstimate estimate_after_links(const LinkedBuild& build, std::uint64_t limit_bytes);
 
 /// Throws Error if an estimate is above `limit_bytes`.
 void refuse_if_too_large(const CostEstimate& estimate, std::uint64_t limit_bytes,

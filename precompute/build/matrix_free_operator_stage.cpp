@@ -117,9 +117,11 @@ void make_operator_from_links(const RayTracer& tracer, std::span<const std::uint
                               TransferData& data, BuildReport& report, PhaseClock& clock) {
   const PatchTable& patches = data.patches;
   const std::uint64_t seed = decided.form_factors.seed;
-  const LinkedBuild build =
-      linked_build(built_scene(patches.size(), data.mesh), data.links.pair.size(),
-                   patches.reflectance, roles, decided.tolerance);
+  const LinkedBuild build{.scene = built_scene(patches.size(), data.mesh),
+                          .link_count = data.links.pair.size(),
+                          .matrix_count = distinct_channels(patches.reflectance),
+                          .roles = roles,
+                          .tolerance = decided.tolerance};
   // Used from the first light to the last check, so it is made once.
   const auto links =
       std::make_shared<const LinkedFormFactors>(data.links, patches.area, patches.centroid);

@@ -39,7 +39,8 @@ void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& deci
 /// solved for without being stored as a whole (matrix_free_transfer.h). The error is measured
 /// against the links, which neither compression affects. If no tolerance of form factors is set, it
 /// is reduced by the fraction of the light that receivers get. How far links and operator together
-/// are from exact form factors is estimated by rays; `shown_patch` [t] is that of PatchModel.
+/// are from exact form factors is estimated by rays; `shown_patch` [t] is that of PatchModel. The
+/// memory limit of `decided` is for what comes on top of what the process held before links.
 void make_operator_from_links(const RayTracer& tracer, std::span<const std::uint32_t> shown_patch,
                               const BuildSettings& decided, const PatchRoles& roles,
                               TransferData& data, BuildReport& report, PhaseClock& clock);

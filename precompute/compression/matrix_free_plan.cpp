@@ -38,7 +38,9 @@ MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::s
   const std::size_t panel = patch_count * kWidth * matrix_count * sizeof(float);
   const std::size_t side =
       largest_piece(static_cast<std::uint32_t>(HierarchicalFormat::position_count(patch_count)));
-  const std::size_t piece = side * side * matrix_count * (sizeof(float) + 3 * sizeof(double));
+  // What is compressed of a piece is held in doubles too, but before the operator is whole
+  // (lab/114).
+  const std::size_t piece = side * side * matrix_count * sizeof(float);
   const std::size_t groups_of_panel = matrix_count * kWidth / kBatchColumns;
   const std::uint64_t limit = settings.memory_limit_bytes;
   const double operators =

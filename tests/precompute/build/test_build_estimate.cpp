@@ -76,18 +76,14 @@ TEST(BuildEstimate, GrowsWithEverythingAndFallsWithReceiversAndSources) {
   part.roles.role.assign(build.scene.patch_count, 0);
   std::fill_n(part.roles.role.begin(), 10000, PatchRoles::kBoth);
   EXPECT_LT(bytes(part), bytes(build));
-  PatchModel model;
-  model.patches.area.assign(part.scene.patch_count, 1);
-  model.patches.reflectance.assign(part.scene.patch_count, {0.5F, 0.5F, 0.5F});
-  BuildSettings decided;
-  decided.memory_limit_bytes = kPlenty;
-  const CostEstimate estimate = estimate_after_links(model, part.link_count, part.roles, decided);
+  const CostEstimate estimate = estimate_after_links(part, kPlenty);
   EXPECT_EQ(estimate.receiver_count, 10000U);
   EXPECT_EQ(estimate.source_count, 10000U);
   EXPECT_EQ(estimate.link_count, part.link_count);
-  // What the process holds counts, but for the links.
-  EXPECT_GE(estimate.peak_bytes, bytes(part));
-  EXPECT_LE(estimate.peak_bytes, bytes(part) + resident_memory_bytes());
+  EXPECT_EQ(estimate.peak_bytes, bytes(part));
+  LinkedBuild beside = part;
+  beside.held_bytes = 1000;
+  EXPECT_EQ(bytes(beside), bytes(part) + 1000);
 }
 
 TEST(BuildEstimate, IsRefusedAboveTheLimit) {
