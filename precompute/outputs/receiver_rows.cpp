@@ -7,10 +7,12 @@
 
 #include "precompute/base/parallel_progress.h"
 #include "precompute/compression/form_factor_compression.h"
+#include "precompute/lights/random_lights.h"
 #include "precompute/outputs/receiver_sets.h"
 #include "precompute/outputs/receiver_views.h"
 #include "precompute/patches/covers.h"
 #include "rebounce/error.h"
+#include "runtime/rays/triangle.h"
 #include "transfer/base/grouped.h"
 
 namespace rebounce {
@@ -27,7 +29,10 @@ constexpr std::size_t kLights = 32;
 // the scene's root mean square.
 constexpr float kDim = 0.1F;
 
-// lab/109
+// A vertex gets no row if its share of the surface is more than this part of a patch (lab/109).
+constexpr double kLargestShare = 0.5;
+
+// Of light on single patches, beside lamps (lab/109).
 constexpr double kSinglePatchWeight = 0.1;
 
 constexpr float kLargestByte = 127;
@@ -42,24 +47,28 @@ struct Lights {
 Lights light_scene(const TransferData& data, const RayTracer& tracer, std::uint64_t seed) {
   const PatchTable& patches = data.patches;
   const DrawnLights drawn = draw_fitting_lights(data, tracer, seed, data.transfer->roles());
-  std::vector<std::vector<Float3>> exitance;
+  const double whole = std::accumulate(patches.area.begin(), patches.area.end(), 0.0);
   const std::size_t count = std::min(kLights, drawn.training.size());
+  std::vector<std::vector<Float3>> exitance, arriving;
+  std::vector<float> workspace(data.transfer->workspace_size());
   for (std::size_t k = 0; k < count; ++k) {
-    exitance.push_back(drawn.training[k * drawn.training.size() / count]);
+    const std::vector<Float3>& light = drawn.training[k * drawn.training.size() / count];
+    std::vector<Float3> arrives(patches.size());
+    data.transfer->apply(light, arrives, workspace);
+    if (arrives_nowhere(arrives, light, patches.area)) continue;
+    exitance.push_back(light);
+    arriving.push_back(std::move(arrives));
   }
   Lights lights;
   lights.radiosity = radiosities_of(*data.transfer, patches.reflectance, exitance);
   lights.irradiance.resize(static_cast<Eigen::Index>(patches.size()),
-                           static_cast<Eigen::Index>(count));
-  lights.usual.setZero(static_cast<Eigen::Index>(count));
-  const double whole = std::accumulate(patches.area.begin(), patches.area.end(), 0.0);
-  std::vector<Float3> arriving(patches.size());
-  std::vector<float> workspace(data.transfer->workspace_size());
-  for (std::size_t k = 0; k < count; ++k) {
-    data.transfer->apply(exitance[k], arriving, workspace);
+                           static_cast<Eigen::Index>(arriving.size()));
+  lights.usual.resize(static_cast<Eigen::Index>(arriving.size()));
+  for (std::size_t k = 0; k < arriving.size(); ++k) {
     double square = 0;
-    for (std::size_t i = 0; i < arriving.size(); ++i) {
-      const float mean = (arriving[i][0] + arriving[i][1] + arriving[i][2]) / kChannelCount;
+    for (std::size_t i = 0; i < patches.size(); ++i) {
+      const auto& [r, g, b] = arriving[k][i];
+      const float mean = (r + g + b) / kChannelCount;
       lights.irradiance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = mean;
       square += static_cast<double>(patches.area[i]) * mean * mean;
     }
@@ -104,6 +113,7 @@ class RowBuilder {
       report_progress(rest, static_cast<double>(begin) / static_cast<double>(order.size()));
       add_batch(std::span(order).subspan(begin, std::min(kBatch, order.size() - begin)));
     }
+    if (rows_.group_count() == 0) return {};
     return std::move(rows_);
   }
 
@@ -135,13 +145,26 @@ class RowBuilder {
     parallel.finish();
   }
 
-  /// The vertices that show patches, neighbours after each other.
+  /// Whether the triangles around a vertex are so small that it can show more than its patches:
+  /// on large walls, which have triangles as large as patches, weights do as well.
+  bool is_finer_than_patches(std::uint32_t vertex) const {
+    double area = 0, of_patches = 0;
+    for (const std::uint32_t t : triangles_[vertex]) {
+      const double size = area_of(corners_of(data_.mesh, t));
+      area += size;
+      of_patches += size * static_cast<double>(data_.patches.area[shown_patch_[t]]);
+    }
+    const double share = area / 3;  // the integral of the hat function
+    return share * area < kLargestShare * of_patches;
+  }
+
+  /// The vertices that may get rows, neighbours after each other.
   std::vector<std::uint32_t> vertex_order() const {
     const DisplayMesh& mesh = data_.mesh;
     std::vector<std::uint32_t> shown;
     PatchTable places;
     for (std::uint32_t v = 0; v < mesh.position.size(); ++v) {
-      if (mesh.weight_begin[v] == mesh.weight_begin[v + 1] || triangles_[v].empty()) continue;
+      if (mesh.weight_begin[v] == mesh.weight_begin[v + 1] || !is_finer_than_patches(v)) continue;
       shown.push_back(v);
       places.area.push_back(1);
       places.centroid.push_back(mesh.position[v]);

@@ -104,8 +104,8 @@ class SetChoice {
     Eigen::MatrixXf off = -all * mean.transpose();
     for (Eigen::Index k = 0; k < count; ++k) off.noalias() += part.col(k) * lit_.row(from + k);
     const double receivers = static_cast<double>(part.rows());
-    const double of_lights =
-        static_cast<double>(off.squaredNorm()) / static_cast<double>(off.cols());
+    const double of_lights = static_cast<double>(off.squaredNorm()) /
+                             static_cast<double>(std::max<Eigen::Index>(off.cols(), 1));
     return (of_lights + settings_.single_patch * of_single_patches(part, all, from, count, area)) /
            receivers;
   }

@@ -18,14 +18,15 @@
 namespace rebounce::test_receiver_rows {
 namespace {
 
-/// A room with a shelf of nine boxes close to each other, all smaller than its patches.
+/// A room with nine boxes close to each other, of material 1, all smaller than its patches.
 Scene room_of_small_things() {
   Scene scene = test::empty_scene({0.5F, 0.6F, 0.7F});
+  scene.materials.resize(2, scene.materials[0]);
   test::add_box(scene, {0, 0, 0}, {3, 2.5, 4}, true);
   for (int i = 0; i < 3; ++i) {
     for (int k = 0; k < 3; ++k) {
       const glm::dvec3 low(1 + 0.3 * i, 0.8, 1.2 + 0.3 * k);
-      test::add_box(scene, low, low + glm::dvec3(0.2, 0.15 + 0.1 * ((i + k) % 3), 0.2), false);
+      test::add_box(scene, low, low + glm::dvec3(0.2, 0.15 + 0.1 * ((i + k) % 3), 0.2), false, 1);
     }
   }
   return scene;
@@ -53,8 +54,8 @@ Light lamp() {
   return light;
 }
 
-/// The error of values at vertices, interpolated in the middles of triangles, against rays that
-/// bring the radiosity of the patches they meet.
+/// The error of values at vertices of the boxes, interpolated in the middles of triangles, against
+/// rays that bring the radiosity of the patches they meet.
 double error_against_rays(const Engine& engine, std::span<const Float3> at_vertices) {
   const DisplayMesh& mesh = engine.data().mesh;
   double off = 0, all = 0;
@@ -62,6 +63,7 @@ double error_against_rays(const Engine& engine, std::span<const Float3> at_verti
     if (mesh.triangle_patch[t] == kNone) continue;
     const TriangleCorners corners = corners_of(mesh, t);
     const Float3 normal = to_float3(front_normal(corners));
+    if (mesh.triangle_material[t] != 1) continue;
     const Float3 middle = to_float3((corners[0] + corners[1] + corners[2]) / 3.0);
     const glm::dvec3 truth = test::irradiance_at(
         engine, engine.parts().tracer->offset_point(middle, normal), normal, 1024);
