@@ -236,7 +236,7 @@ TEST(BuildFromLinks, RefusesWhatIsOverTheLimitWithTheNumbers) {
 TEST(BuildFromLinks, LinksAreTakenWherePairsAreOverTheLimit) {
   const auto peak_bytes = [&](ExchangeSource kind, std::uint64_t limit) {
     BuildSettings settings;
-    settings.subdivision.patch_count = 300;
+    settings.subdivision.patch_count = 8000;  // of fewer, links do not take much less
     settings.exchange_source = kind;
     settings.memory_limit_bytes = limit;
     std::uint64_t bytes = 0;
@@ -250,12 +250,12 @@ TEST(BuildFromLinks, LinksAreTakenWherePairsAreOverTheLimit) {
   };
   const std::uint64_t pairs = peak_bytes(ExchangeSource::kPairs, 0),
                       links = peak_bytes(ExchangeSource::kLinks, pairs - 1);
-  // What the process holds already counts for pairs, and is not the same each time.
+  // What the process holds already counts, and is not the same each time.
   constexpr std::uint64_t kHeldMore = 8 << 20;
   ASSERT_GT(pairs, links + 2 * kHeldMore);
   EXPECT_NEAR(peak_bytes(ExchangeSource::kAutomatic, 0), pairs, kHeldMore);
   EXPECT_NEAR(peak_bytes(ExchangeSource::kAutomatic, pairs + kHeldMore), pairs, kHeldMore);
-  EXPECT_EQ(peak_bytes(ExchangeSource::kAutomatic, pairs - kHeldMore), links);
+  EXPECT_NEAR(peak_bytes(ExchangeSource::kAutomatic, pairs - kHeldMore), links, kHeldMore);
 }
 
 }  // namespace
