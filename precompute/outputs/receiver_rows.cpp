@@ -248,8 +248,8 @@ class RowBuilder {
       for (const ViewEntry& entry : found[k].added) rows.position.push_back(entry.patch);
     }
     std::ranges::sort(rows.position);
-    const auto rest = std::ranges::unique(rows.position);
-    rows.position.erase(rest.begin(), rest.end());
+    rows.position.erase(std::unique(rows.position.begin(), rows.position.end()),
+                        rows.position.end());
     rows.part.setZero(static_cast<Eigen::Index>(kept.size()),
                       static_cast<Eigen::Index>(rows.position.size()));
     rows.light.setZero(lights_.usual.size());

@@ -88,7 +88,7 @@ class SetChoice {
   /// The mean square of the relative error at a receiver, if a cluster shines evenly.
   double error_of(const Cluster& cluster, std::size_t first, std::size_t last) const {
     const auto begin = static_cast<Eigen::Index>(cluster.begin);
-    const auto end = static_cast<Eigen::Index>(cluster.begin + cluster.count);
+    const Eigen::Index end = begin + static_cast<Eigen::Index>(cluster.count);
     const auto from = static_cast<Eigen::Index>(first);
     const auto count = static_cast<Eigen::Index>(last - first);
     const double area =
