@@ -91,8 +91,8 @@ struct SurfaceHarmonicSettings {
 /// What vertices of the display mesh receive beyond what their patches do (ReceiverRows).
 struct ReceiverRowSettings {
   bool at_vertices = false;  ///< whether vertices have rows of their own
-  /// Rays of each vertex, at least 64. The noise of what vertices show falls with the number, about
-  /// in proportion to its power of 0.7; offline time grows with it.
+  /// Rays of each vertex, at least 64. The noise of what vertices show falls with the number;
+  /// offline time grows with it.
   int ray_count = 1024;
   /// Relative error of the light, root mean square over lights, that rows may leave; vertices whose
   /// weights err less have none. A smaller one takes more bytes.

