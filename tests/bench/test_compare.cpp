@@ -168,8 +168,8 @@ TEST(Receivers, SeeTheSameInAFurnace) {
       compare_reconstruction(furnace.data, tracer, h, f.points, f.truth);
   const ReceiverErrors error =
       compare_receivers({furnace.data, tracer, h, {}, {}}, shown, f.points, f.truth, 1);
-  for (const RelativeError& e : {error.patch_value, error.rows,
-                                 error.smooth_light, error.exact_lamps, error.exact_both}) {
+  for (const RelativeError& e :
+       {error.patch_value, error.rows, error.smooth_light, error.exact_lamps, error.exact_both}) {
     EXPECT_EQ(e.count, 500U);
     EXPECT_LT(e.error, 1e-5);
   }

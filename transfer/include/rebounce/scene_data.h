@@ -156,7 +156,7 @@ struct DisplayMesh {
 /// lx of irradiance.
 struct ReceiverRows {
   static constexpr std::uint32_t kGroup = 64;
-  static constexpr std::uint32_t kSetStep = 4;     ///< the sets of a group are a multiple of this
+  static constexpr std::uint32_t kSetStep = 4;      ///< the sets of a group are a multiple of this
   static constexpr std::uint32_t kMostSets = 1024;  ///< of a group
 
   std::vector<std::uint32_t> patch;               ///< [n] a permutation
