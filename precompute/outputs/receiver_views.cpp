@@ -19,11 +19,14 @@ constexpr glm::dvec2 kPlaceShift{0.25, 0.75}, kDirectionShift{0.5, 0.5};
 // How much of the dual function is in the weights of a vertex; the rest is the hat function.
 constexpr double kDualPart = 0.75;  // lab/109
 
-// A cover faces what it covers: the cosine between their normals is below this.
-constexpr double kFacing = -0.7;
+// Places are seen if one of this number of rays from them is longer than what counts as far.
+constexpr std::uint64_t kLooks = 3;  // lab/118
 
-// If less than this part of a vertex's surface is open, it counts as hidden.
-constexpr double kLeastOpen = 0.125;
+// The weight of other places, beside those that are seen: it decides where none is.
+constexpr double kUnseen = 1.0 / 64;
+
+// Where a smaller part of a vertex's surface is seen, to go on from there to the vertex is noisy.
+constexpr double kWellSeen = 0.25;
 
 /// Points on the triangles around a vertex, evenly by area.
 class RingPoints {
@@ -65,6 +68,7 @@ ReceiverViewer::ReceiverViewer(const DisplayMesh& mesh, std::span<const std::uin
       tracer_(tracer),
       point_(static_cast<std::size_t>(ray_count)),
       height_(point_.size()),
+      seen_(point_.size()),
       ray_(point_.size()),
       hit_(point_.size()),
       sum_(patch_count, 0.0) {}
@@ -102,14 +106,21 @@ void ReceiverViewer::look_from_patch(std::span<const std::uint32_t> triangles, V
   take(row);
 }
 
-bool ReceiverViewer::is_hidden(std::size_t ray, double cover) const {
-  const Hit& hit = hit_[ray];
-  if (hit.triangle == kNone) return false;
-  if (meets_back(mesh_, hit)) return true;
-  const glm::dvec3 normal = to_dvec3(point_[ray].normal);
-  if (glm::dot(normal, to_dvec3(ray_[ray].direction)) * hit.t >= cover) return false;
-  const glm::dvec3 other = front_normal(corners_of(mesh_, hit.triangle));
-  return glm::dot(normal, hit.front ? other : -other) < kFacing;
+void ReceiverViewer::find_seen(double sight) {
+  std::ranges::fill(seen_, kUnseen);
+  for (std::uint64_t look = 0; look < kLooks; ++look) {
+    NormalFrame frame;
+    for (std::size_t k = 0; k < point_.size(); ++k) {
+      const glm::dvec2 square = unit_square(mix_bits(look * point_.size() + k));
+      const glm::vec3 direction = frame.turn(point_[k].normal, to_cosine_direction(square));
+      ray_[k] = make_free_ray(point_[k], direction, tracer_);
+      ray_[k].t_far = static_cast<float>(sight);
+    }
+    tracer_.intersect(ray_, hit_);
+    for (std::size_t k = 0; k < hit_.size(); ++k) {
+      if (hit_[k].triangle == kNone) seen_[k] = 1;
+    }
+  }
 }
 
 // The dual functions of the hat functions h_v over the triangles around v are 4 h_v - 1: their
@@ -118,34 +129,28 @@ bool ReceiverViewer::is_hidden(std::size_t ray, double cover) const {
 // (B. Wohlmuth, "A mortar finite element method using dual spaces for the Lagrange multiplier",
 // 2000). The mean with the hat function itself, 3 h_v, flattens the light and is less noisy.
 void ReceiverViewer::look_from_vertex(std::uint32_t vertex,
-                                      std::span<const std::uint32_t> triangles, double cover,
+                                      std::span<const std::uint32_t> triangles, double sight,
                                       ViewRow& row) {
   row.clear();
   const RingPoints ring(mesh_, vertex, triangles);
   if (ring.empty()) return;
   const PointSequence places = r2_sequence(kPlaceShift);
   for (std::uint32_t k = 0; k < point_.size(); ++k) point_[k] = ring.at(places[k], height_[k]);
+  find_seen(sight);
   trace();
-  std::vector<bool> hidden(ray_.size());
-  double all = 0, open = 0, dual = 0;
-  const auto dual_of = [](double height) { return kDualPart * (3 * height - 1); };
-  for (std::size_t k = 0; k < ray_.size(); ++k) {
-    hidden[k] = is_hidden(k, cover);
+  double all = 0, seen = 0;
+  for (std::size_t k = 0; k < point_.size(); ++k) {
     all += height_[k];
-    if (!hidden[k]) open += height_[k];
+    seen += seen_[k] * height_[k];
   }
-  if (open < kLeastOpen * all) {
-    hidden.assign(ray_.size(), false);
-    open = all;
-  }
-  for (std::size_t k = 0; k < ray_.size(); ++k) {
-    if (!hidden[k]) dual += dual_of(height_[k]);
-  }
+  const double dual_part = kDualPart * std::min(1.0, seen / (kWellSeen * all));
+  double dual = 0;
+  for (std::size_t k = 0; k < point_.size(); ++k) dual += seen_[k] * (3 * height_[k] - 1);
   // What the dual function adds has the sum 0 also where a part is left out.
-  for (std::size_t k = 0; k < ray_.size(); ++k) {
-    if (hidden[k]) continue;
-    const double weight = height_[k] * (1 - dual / open) + dual_of(height_[k]);
-    add(patch_at(mesh_, shown_patch_, hit_[k]), weight / open);
+  for (std::size_t k = 0; k < point_.size(); ++k) {
+    const double height = height_[k];
+    const double weight = height + dual_part * (3 * height - 1 - height * dual / seen);
+    add(patch_at(mesh_, shown_patch_, hit_[k]), seen_[k] * weight / seen);
   }
   take(row);
 }
