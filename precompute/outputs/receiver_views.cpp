@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/glm.hpp>
+#include <numeric>
 
 #include "precompute/sampling/hemisphere_rays.h"
 #include "runtime/rays/cumulative_choice.h"
@@ -68,7 +69,6 @@ ReceiverViewer::ReceiverViewer(const DisplayMesh& mesh, std::span<const std::uin
       tracer_(tracer),
       point_(static_cast<std::size_t>(ray_count)),
       height_(point_.size()),
-      seen_(point_.size()),
       ray_(point_.size()),
       hit_(point_.size()),
       sum_(patch_count, 0.0) {}
@@ -106,21 +106,37 @@ void ReceiverViewer::look_from_patch(std::span<const std::uint32_t> triangles, V
   take(row);
 }
 
-void ReceiverViewer::find_seen(double sight) {
-  std::ranges::fill(seen_, kUnseen);
+double ReceiverViewer::keep_seen(double sight) {
+  const std::size_t count = point_.size();
+  std::vector<bool> is_seen(count, false);
   for (std::uint64_t look = 0; look < kLooks; ++look) {
     NormalFrame frame;
-    for (std::size_t k = 0; k < point_.size(); ++k) {
-      const glm::dvec2 square = unit_square(mix_bits(look * point_.size() + k));
+    for (std::size_t k = 0; k < count; ++k) {
+      const glm::dvec2 square = unit_square(mix_bits(look * count + k));
       const glm::vec3 direction = frame.turn(point_[k].normal, to_cosine_direction(square));
       ray_[k] = make_free_ray(point_[k], direction, tracer_);
       ray_[k].t_far = static_cast<float>(sight);
     }
     tracer_.intersect(ray_, hit_);
-    for (std::size_t k = 0; k < hit_.size(); ++k) {
-      if (hit_[k].triangle == kNone) seen_[k] = 1;
+    for (std::size_t k = 0; k < count; ++k) {
+      if (hit_[k].triangle == kNone) is_seen[k] = true;
     }
   }
+  const auto seen_count = static_cast<double>(std::ranges::count(is_seen, true));
+  const double step = (seen_count + kUnseen * (static_cast<double>(count) - seen_count)) /
+                      static_cast<double>(count);
+  const std::vector<PatchPoint> place = point_;
+  const std::vector<double> height = height_;
+  double reached = 0;  // by the places before `next`
+  std::size_t next = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    while (next < count && reached <= (static_cast<double>(k) + 0.5) * step) {
+      reached += is_seen[next++] ? 1 : kUnseen;
+    }
+    point_[k] = place[next - 1];
+    height_[k] = height[next - 1];
+  }
+  return seen_count / static_cast<double>(count);
 }
 
 // The dual functions of the hat functions h_v over the triangles around v are 4 h_v - 1: their
@@ -136,21 +152,15 @@ void ReceiverViewer::look_from_vertex(std::uint32_t vertex,
   if (ring.empty()) return;
   const PointSequence places = r2_sequence(kPlaceShift);
   for (std::uint32_t k = 0; k < point_.size(); ++k) point_[k] = ring.at(places[k], height_[k]);
-  find_seen(sight);
+  const double seen = keep_seen(sight);
   trace();
-  double all = 0, seen = 0;
-  for (std::size_t k = 0; k < point_.size(); ++k) {
-    all += height_[k];
-    seen += seen_[k] * height_[k];
-  }
-  const double dual_part = kDualPart * std::min(1.0, seen / (kWellSeen * all));
-  double dual = 0;
-  for (std::size_t k = 0; k < point_.size(); ++k) dual += seen_[k] * (3 * height_[k] - 1);
+  const double dual_part = kDualPart * std::min(1.0, seen / kWellSeen);
+  const double heights = std::accumulate(height_.begin(), height_.end(), 0.0);
   // What the dual function adds has the sum 0 also where a part is left out.
-  for (std::size_t k = 0; k < point_.size(); ++k) {
-    const double height = height_[k];
-    const double weight = height + dual_part * (3 * height - 1 - height * dual / seen);
-    add(patch_at(mesh_, shown_patch_, hit_[k]), seen_[k] * weight / seen);
+  const double mean = 3 - static_cast<double>(height_.size()) / heights;
+  for (std::size_t k = 0; k < height_.size(); ++k) {
+    const double dual = 3 * height_[k] - 1 - mean * height_[k];
+    add(patch_at(mesh_, shown_patch_, hit_[k]), (height_[k] + dual_part * dual) / heights);
   }
   take(row);
 }

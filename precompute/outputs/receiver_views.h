@@ -40,7 +40,8 @@ class ReceiverViewer {
 
  private:
   void trace();
-  void find_seen(double sight);
+  /// Replaces places that are not seen by those that are; returns the part that is.
+  double keep_seen(double sight);
   void add(std::uint32_t patch, double part);
   void take(ViewRow& row);
 
@@ -49,7 +50,6 @@ class ReceiverViewer {
   const RayTracer& tracer_;
   std::vector<PatchPoint> point_;  ///< [rays]
   std::vector<double> height_;     ///< [rays] of the vertex's hat function where they begin
-  std::vector<double> seen_;       ///< [rays] the weight of where they begin
   std::vector<Ray> ray_;
   std::vector<Hit> hit_;
   std::vector<double> sum_;             ///< [n] of the row that is made
