@@ -28,7 +28,7 @@ constexpr std::size_t kLights = 32;
 // the scene's root mean square.
 constexpr float kDim = 0.1F;
 
-// A vertex gets no row if its share of the surface is more than this part of a patch (lab/109).
+// A vertex gets no row if its share of the surface is more than this part of a patch (lab/118).
 constexpr double kLargestShare = 0.5;
 
 // Of light on single patches, beside lamps (lab/109).

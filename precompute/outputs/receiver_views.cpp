@@ -20,14 +20,8 @@ constexpr glm::dvec2 kPlaceShift{0.25, 0.75}, kDirectionShift{0.5, 0.5};
 // How much of the dual function is in the weights of a vertex; the rest is the hat function.
 constexpr double kDualPart = 0.75;  // lab/109
 
-// Places are seen if one of this number of rays from them is longer than what counts as far.
-constexpr std::uint64_t kLooks = 3;  // lab/118
-
-// The weight of other places, beside those that are seen: it decides where none is.
+// The weight of places that are not seen, beside that of those that are: it decides where none is.
 constexpr double kUnseen = 1.0 / 64;
-
-// Where a smaller part of a vertex's surface is seen, to go on from there to the vertex is noisy.
-constexpr double kWellSeen = 0.25;
 
 /// Points on the triangles around a vertex, evenly by area.
 class RingPoints {
@@ -108,21 +102,15 @@ void ReceiverViewer::look_from_patch(std::span<const std::uint32_t> triangles, V
 
 double ReceiverViewer::keep_seen(double sight) {
   const std::size_t count = point_.size();
-  std::vector<bool> is_seen(count, false);
-  for (std::uint64_t look = 0; look < kLooks; ++look) {
-    NormalFrame frame;
-    for (std::size_t k = 0; k < count; ++k) {
-      const glm::dvec2 square = unit_square(mix_bits(look * count + k));
-      const glm::vec3 direction = frame.turn(point_[k].normal, to_cosine_direction(square));
-      ray_[k] = make_free_ray(point_[k], direction, tracer_);
-      ray_[k].t_far = static_cast<float>(sight);
-    }
-    tracer_.intersect(ray_, hit_);
-    for (std::size_t k = 0; k < count; ++k) {
-      if (hit_[k].triangle == kNone) is_seen[k] = true;
-    }
+  NormalFrame frame;
+  for (std::size_t k = 0; k < count; ++k) {
+    // Independent of the rays that bring light: at random, and not by their sequence.
+    const glm::vec3 direction = to_cosine_direction(unit_square(mix_bits(k)));
+    ray_[k] = make_free_ray(point_[k], frame.turn(point_[k].normal, direction), tracer_);
+    ray_[k].t_far = static_cast<float>(sight);
   }
-  const auto seen_count = static_cast<double>(std::ranges::count(is_seen, true));
+  tracer_.intersect(ray_, hit_);
+  const auto seen_count = static_cast<double>(std::ranges::count(hit_, kNone, &Hit::triangle));
   const double step = (seen_count + kUnseen * (static_cast<double>(count) - seen_count)) /
                       static_cast<double>(count);
   const std::vector<PatchPoint> place = point_;
@@ -131,7 +119,7 @@ double ReceiverViewer::keep_seen(double sight) {
   std::size_t next = 0;
   for (std::size_t k = 0; k < count; ++k) {
     while (next < count && reached <= (static_cast<double>(k) + 0.5) * step) {
-      reached += is_seen[next++] ? 1 : kUnseen;
+      reached += hit_[next++].triangle == kNone ? 1 : kUnseen;
     }
     point_[k] = place[next - 1];
     height_[k] = height[next - 1];
@@ -154,7 +142,8 @@ void ReceiverViewer::look_from_vertex(std::uint32_t vertex,
   for (std::uint32_t k = 0; k < point_.size(); ++k) point_[k] = ring.at(places[k], height_[k]);
   const double seen = keep_seen(sight);
   trace();
-  const double dual_part = kDualPart * std::min(1.0, seen / kWellSeen);
+  // Where little is seen, to go on from there to the vertex would be noisy.
+  const double dual_part = kDualPart * seen;
   const double heights = std::accumulate(height_.begin(), height_.end(), 0.0);
   // What the dual function adds has the sum 0 also where a part is left out.
   const double mean = 3 - static_cast<double>(height_.size()) / heights;
