@@ -34,6 +34,13 @@ constexpr double kErrorInNooks = 0.15;
 // What rows of closed rooms may be off: scaling stops after a number of steps.
 constexpr double kClosure = 1e-3;
 
+// What is said counts what the process holds, and the address sanitizer keeps what was freed.
+#ifdef __SANITIZE_ADDRESS__
+constexpr bool kGivesMemoryBack = false;
+#else
+constexpr bool kGivesMemoryBack = true;
+#endif
+
 const std::string kScenes = REBOUNCE_SOURCE_DIR "/tests/scenes/";
 const std::string kRoom = kScenes + "furnished_room.gltf";
 const std::string kBareRoom = kScenes + "white_room.gltf";
@@ -216,7 +223,9 @@ TEST(BuildFromLinks, SaysAgainWhatIsLeftWhenLinksAreKnown) {
   EXPECT_EQ(estimates[0].link_count, 0U);
   EXPECT_EQ(estimates[1].link_count, report.link_count);
   EXPECT_EQ(estimates[1].patch_count, report.patch_count);
-  EXPECT_LT(estimates[1].peak_bytes, estimates[0].peak_bytes) << "a bare room";
+  if (kGivesMemoryBack) {
+    EXPECT_LT(estimates[1].peak_bytes, estimates[0].peak_bytes) << "a bare room";
+  }
   EXPECT_EQ(report.estimate_after_links->peak_bytes, estimates[1].peak_bytes);
 }
 
@@ -236,6 +245,7 @@ TEST(BuildFromLinks, RefusesWhatIsOverTheLimitWithTheNumbers) {
 }
 
 TEST(BuildFromLinks, LinksAreTakenWherePairsAreOverTheLimit) {
+  if (!kGivesMemoryBack) GTEST_SKIP() << "the address sanitizer keeps memory that was freed";
   const auto peak_bytes = [&](ExchangeSource kind, std::uint64_t limit) {
     BuildSettings settings;
     settings.subdivision.patch_count = 8000;  // of fewer, links do not take much less
