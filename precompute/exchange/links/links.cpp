@@ -57,7 +57,7 @@ LinkBuild build_links(const PatchModel& model, const RayTracer& tracer,
   build.links.scale.assign(scaling.factor.begin(), scaling.factor.end());
   build.closure = scaling.closure;
   static_cast<EscapedLight&>(build) = share_escape(scaling.row_sum, refined.escape);
-  build.ray_count = refined.ray_count + model.patches.size() * settings.hemisphere_rays;
+  build.ray_count = refined.ray_count;
   build.candidate_count = refined.candidate_count;
   return build;
 }

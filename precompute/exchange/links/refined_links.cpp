@@ -1,5 +1,7 @@
 #include "precompute/exchange/links/refined_links.h"
 
+#include "precompute/base/parallel_progress.h"
+#include "precompute/exchange/links/leaf_links.h"
 #include "precompute/exchange/links/link_scaling.h"
 
 namespace rebounce {
@@ -9,21 +11,59 @@ namespace {
 // row that is off by more misses light or has light that is hidden (lab/014).
 constexpr double kLinkRowSumTolerance = 0.02;
 
-std::vector<Escape> measure_escapes(const PatchModel& model, const RayTracer& tracer,
-                                    const FormFactorSettings& settings) {
-  const PatchTriangles triangles(model.mesh.triangle_patch, model.patches.size());
-  std::vector<Escape> escape(model.patches.size());
-#pragma omp parallel
-  {
-    EscapeScratch scratch;
-#pragma omp for schedule(dynamic, 16)
-    for (std::uint32_t i = 0; i < escape.size(); ++i) {
-      escape[i] = measure_escape(model.mesh, model.shown_patch, triangles[i], i, tracer,
-                                 settings.hemisphere_rays, settings.seed, scratch);
-    }
+/// Finds the exchange of links between single patches, and what escapes.
+class LeafMeasurement {
+ public:
+  LeafMeasurement(const PatchModel& model, const ShadowRays& shadow_rays, const RayTracer& tracer,
+                  const FormFactorSettings& settings)
+      : model_(model),
+        geometry_(shadow_rays.geometry()),
+        tracer_(tracer),
+        settings_(settings),
+        counted_(geometry_.areas(), settings.hemisphere_rays),
+        exchange_(shadow_rays, tracer, counted_, settings) {}
+
+  /// Measures `leaves` with this number of probe rays, and returns the escape of all patches.
+  std::vector<Escape> run(LeafLinks& leaves, int probe_rays, const Progress& progress) {
+    std::vector<Escape> escape = trace_hemispheres(leaves, part_of(progress, 0.0, 0.5));
+    ray_count_ += leaves.measure(geometry_, exchange_, probe_rays, part_of(progress, 0.5, 1.0));
+    return escape;
   }
-  return escape;
-}
+
+  std::uint64_t ray_count() const { return ray_count_; }
+
+ private:
+  std::vector<Escape> trace_hemispheres(LeafLinks& leaves, const Progress& progress) {
+    const std::size_t n = model_.patches.size();
+    const PatchTriangles triangles(model_.mesh.triangle_patch, n);
+    std::vector<Escape> escape(n);
+    ParallelProgress loop(progress, n);
+#pragma omp parallel
+    {
+      EscapeScratch scratch;
+      MetPatchCounter counter;
+#pragma omp for schedule(dynamic, 16)
+      for (std::uint32_t i = 0; i < n; ++i) {
+        if (loop.stopped()) continue;
+        escape[i] = measure_escape(model_.mesh, model_.shown_patch, triangles[i], i, tracer_,
+                                   settings_.hemisphere_rays, settings_.seed, scratch);
+        leaves.count(i, counter.count(n, scratch.met));
+        loop.advance();
+      }
+    }
+    loop.finish();
+    ray_count_ += n * static_cast<std::uint64_t>(settings_.hemisphere_rays);
+    return escape;
+  }
+
+  const PatchModel& model_;
+  const PatchGeometry& geometry_;
+  const RayTracer& tracer_;
+  const FormFactorSettings& settings_;
+  CountedExchange counted_;
+  PairExchange exchange_;
+  std::uint64_t ray_count_ = 0;
+};
 
 }  // namespace
 
@@ -32,15 +72,22 @@ RefinedLinks refine_links(const PatchModel& model, const ShadowRays& shadow_rays
                           std::span<const float> weight, const Progress& progress) {
   RefinedLinks result{LinkTree(model, shadow_rays.geometry(), weight), {}, {}, {}, 0, 0};
   LinkRefinement refinement(result.tree, shadow_rays, tracer, settings);
-  refinement.run(part_of(progress, 0.0, 0.5));
-  result.escape = measure_escapes(model, tracer, settings);
+  LeafMeasurement measurement(model, shadow_rays, tracer, settings);
+  refinement.run(part_of(progress, 0.0, 0.4));
+  LeafLinks leaves(result.tree, refinement.links());
+  result.escape = measurement.run(leaves, settings.probe_rays, part_of(progress, 0.4, 0.5));
   result.target = row_sum_targets(result.escape, settings.hemisphere_rays);
   const std::vector<double> ones(model.patches.size(), 1.0);
   const std::vector<double> sum = gather_links(result.tree, refinement.links(), ones);
-  refinement.revise(find_doubtful_rows(sum, result.target, kLinkRowSumTolerance),
-                    part_of(progress, 0.5, 1.0));
+  const std::size_t kept = refinement.revise(
+      find_doubtful_rows(sum, result.target, kLinkRowSumTolerance), part_of(progress, 0.5, 0.9));
+  LeafLinks revised(result.tree, refinement.links().subspan(kept));
+  // The rays are the same as before, and the counts those of other pairs.
+  if (!revised.empty()) {
+    measurement.run(revised, kRefinedProbes * settings.probe_rays, part_of(progress, 0.9, 1.0));
+  }
   result.links.assign(refinement.links().begin(), refinement.links().end());
-  result.ray_count = refinement.ray_count();
+  result.ray_count = refinement.ray_count() + measurement.ray_count();
   result.candidate_count = refinement.candidate_count();
   return result;
 }
