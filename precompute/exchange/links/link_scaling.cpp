@@ -113,50 +113,12 @@ std::vector<double> scaled_row_sums(const LinkTree& tree, std::span<const Link> 
   return sum;
 }
 
-/// The relative change of the exchange by factors, Frobenius; each link counts as equal for all of
-/// its pairs.
-double relative_change(const LinkTree& tree, std::span<const Link> links,
-                       std::span<const double> factor) {
-  const auto nodes = tree.nodes();
-  std::vector<double> mean(nodes.size(), 0.0);
-  for (std::size_t k = nodes.size(); k-- > 0;) {
-    const LinkNode& node = nodes[k];
-    if (node.is_leaf()) {
-      mean[k] = factor[tree.leaf_patch(node)];
-      continue;
-    }
-    for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
-      mean[k] += nodes[c].count * mean[c] / node.count;
-    }
-  }
-  double change = 0, norm = 0;
-  for (const Link& link : links) {
-    const double pairs = static_cast<double>(nodes[link.a].count) * nodes[link.b].count;
-    const double squared = static_cast<double>(link.exchange_area) * link.exchange_area / pairs;
-    const double part = mean[link.a] * mean[link.b] - 1;
-    change += squared * part * part;
-    norm += squared;
-  }
-  return norm > 0 ? std::sqrt(change / norm) : 0;
-}
-
-}  // namespace
-
-std::vector<double> gather_links(const LinkTree& tree, std::span<const Link> links,
-                                 std::span<const double> x) {
-  return push(tree, gather_nodes(pull(tree, x), links), x.size());
-}
-
-LinkScaling scale_links(const LinkTree& tree, std::span<const Link> links,
-                        std::span<const RowSumTarget> target) {
-  LinkScaling result;
-  std::vector<double>&factor = result.factor, &row = result.row_sum;
-  row = gather_links(tree, links, std::vector<double>(target.size(), 1.0));
-  result.closure.row_sum_error_before = largest_row_error(row, target, /*certain=*/false);
-  factor = first_factors(target);
-  row = scaled_row_sums(tree, links, factor);
-  const std::vector<double> wanted = wanted_sums(row, target);
+/// Changes the factors until the rows of `links` add up to `wanted` [n], as far as their limits
+/// allow.
+void scale_to(const LinkTree& tree, std::span<const Link> links, std::span<const double> wanted,
+              std::span<const RowSumTarget> target, std::vector<double>& factor) {
   for (int step = 0; step < kScalingSteps; ++step) {
+    const std::vector<double> row = scaled_row_sums(tree, links, factor);
     double worst = 0;
     for (std::size_t i = 0; i < factor.size(); ++i) {
       if (factor[i] == 0) continue;
@@ -166,11 +128,87 @@ LinkScaling scale_links(const LinkTree& tree, std::span<const Link> links,
                              kGreatestFactor);
     }
     if (worst < kScaled) break;
-    row = scaled_row_sums(tree, links, factor);
   }
+}
+
+/// True for two patches with nothing between them.
+bool is_certain(const LinkTree& tree, const Link& link) {
+  return tree[link.a].is_leaf() && tree[link.b].is_leaf() &&
+         link.exchange_area == link.unoccluded_area;
+}
+
+/// Divides links between patches by their factors, except by those of patches that see almost
+/// nothing.
+void divide(const LinkTree& tree, std::span<const double> factor, std::span<Link> links) {
+  const auto of = [&](std::uint32_t leaf) {
+    const double f = factor[tree.leaf_patch(tree[leaf])];
+    return f < kLeastFactor ? 1 : f;
+  };
+  for (Link& link : links) link.exchange_area /= static_cast<float>(of(link.a) * of(link.b));
+}
+
+/// The squared change of the exchange by factors, and its squared norm, Frobenius.
+struct Change {
+  double change = 0, norm = 0;
+
+  /// Each link counts as equal for all of its pairs.
+  void add(const LinkTree& tree, std::span<const Link> links, std::span<const double> factor) {
+    const auto nodes = tree.nodes();
+    std::vector<double> mean(nodes.size(), 0.0);
+    for (std::size_t k = nodes.size(); k-- > 0;) {
+      const LinkNode& node = nodes[k];
+      if (node.is_leaf()) {
+        mean[k] = factor[tree.leaf_patch(node)];
+        continue;
+      }
+      for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
+        mean[k] += nodes[c].count * mean[c] / node.count;
+      }
+    }
+    for (const Link& link : links) {
+      const double pairs = static_cast<double>(nodes[link.a].count) * nodes[link.b].count;
+      const double squared = static_cast<double>(link.exchange_area) * link.exchange_area / pairs;
+      const double part = mean[link.a] * mean[link.b] - 1;
+      change += squared * part * part;
+      norm += squared;
+    }
+  }
+};
+
+}  // namespace
+
+std::vector<double> gather_links(const LinkTree& tree, std::span<const Link> links,
+                                 std::span<const double> x) {
+  return push(tree, gather_nodes(pull(tree, x), links), x.size());
+}
+
+LinkScaling scale_links(const LinkTree& tree, std::span<Link> links,
+                        std::span<const RowSumTarget> target) {
+  LinkScaling result;
+  std::vector<double>&factor = result.factor, &row = result.row_sum;
+  const auto rest = std::ranges::stable_partition(
+      links, [&](const Link& link) { return is_certain(tree, link); });
+  const std::span certain = links.first(links.size() - rest.size());
+  row = gather_links(tree, links, std::vector<double>(target.size(), 1.0));
+  result.closure.row_sum_error_before = largest_row_error(row, target, /*certain=*/false);
+  factor = first_factors(target);
+  const std::vector<double> wanted = wanted_sums(scaled_row_sums(tree, links, factor), target);
+
+  std::vector<double> of_rest = wanted;
+  const std::vector<double> held = scaled_row_sums(tree, certain, factor);
+  for (std::size_t i = 0; i < held.size(); ++i) of_rest[i] -= held[i];
+  scale_to(tree, rest, of_rest, target, factor);
+  divide(tree, factor, certain);
+  std::vector<double> change = factor;
+  scale_to(tree, links, wanted, target, factor);
   row = scaled_row_sums(tree, links, factor);
   result.closure.row_sum_error_after = largest_row_error(row, target, /*certain=*/true);
-  result.closure.relative_change = relative_change(tree, links, factor);
+
+  Change squared;
+  squared.add(tree, rest, factor);
+  for (std::size_t i = 0; i < change.size(); ++i) change[i] = factor[i] / std::max(change[i], 1e-6);
+  squared.add(tree, certain, change);
+  if (squared.norm > 0) result.closure.relative_change = std::sqrt(squared.change / squared.norm);
   return result;
 }
 
