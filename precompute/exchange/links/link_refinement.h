@@ -36,7 +36,7 @@ struct Link {
 /// visibility. A pair gets more rays the more light it exchanges, so that the light that rays may
 /// miss is below link_epsilon too; pairs without any visible light end there. Parts of a pair whose
 /// rays disagree get all rays, because few rays mostly miss the little light that passes a door.
-/// Links between two patches are left to be measured (leaf_links.h).
+/// Links between two patches are left to be measured (counted_links.h).
 ///
 /// Pairs are refined in generations. OpenMP threads share each generation; the bits do not depend
 /// on their number. Throws Cancelled if `progress` asks to stop.
