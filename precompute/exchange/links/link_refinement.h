@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "precompute/base/progress.h"
@@ -36,7 +37,7 @@ struct Link {
 /// visibility. A pair gets more rays the more light it exchanges, so that the light that rays may
 /// miss is below link_epsilon too; pairs without any visible light end there. Parts of a pair whose
 /// rays disagree get all rays, because few rays mostly miss the little light that passes a door.
-/// Links between two patches are left to be measured (counted_links.h).
+/// Links between two patches are left to be measured (leaf_links.h).
 ///
 /// Pairs are refined in generations. OpenMP threads share each generation; the bits do not depend
 /// on their number. Throws Cancelled if `progress` asks to stop.
@@ -57,6 +58,7 @@ class LinkRefinement {
   /// area of 0 are pairs that are hidden from each other.
   std::span<const Link> links() const { return links_; }
   std::span<Link> links() { return links_; }
+  std::vector<Link> take_links() { return std::move(links_); }
   /// Pairs of nodes that were examined.
   std::uint64_t candidate_count() const { return candidate_count_; }
   std::uint64_t ray_count() const { return ray_count_; }

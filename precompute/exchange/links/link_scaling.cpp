@@ -12,6 +12,10 @@ constexpr int kScalingSteps = 30;  // each step about halves the rest
 constexpr double kScaled = 1e-6;   // a row sum this near to its target is scaled
 constexpr double kLeastFactor = 0.5, kGreatestFactor = 2;
 
+// The same where links between patches with nothing between them stay. Where more than that would
+// be needed, as in nooks, these are what is off.
+constexpr double kLeastOfRest = 0.9, kGreatestOfRest = 1.1;
+
 // Least factor of patches that see almost nothing: their exchange has leaked through nodes on both
 // sides of a wall and may be removed.
 constexpr double kLeastFactorUnseeing = 1e-6;
@@ -26,9 +30,20 @@ struct Moments {
   glm::dvec3 first{0};
 };
 
-double least_factor(const RowSumTarget& target) {
-  return target.sum <= 3 * target.deviation ? kLeastFactorUnseeing : kLeastFactor;
+bool sees_almost_nothing(const RowSumTarget& target) {
+  return target.sum <= 3 * target.deviation;
 }
+
+/// Limits of the factor of a patch.
+struct Limits {
+  double least, greatest, least_unseeing;
+
+  double clamp(double factor, const RowSumTarget& target) const {
+    return std::clamp(factor, sees_almost_nothing(target) ? least_unseeing : least, greatest);
+  }
+};
+constexpr Limits kOfRest{kLeastOfRest, kGreatestOfRest, kLeastOfRest},
+    kOfAll{kLeastFactor, kGreatestFactor, kLeastFactorUnseeing};
 
 /// The mean of `x` over each node.
 std::vector<Moments> pull(const LinkTree& tree, std::span<const double> x) {
@@ -116,7 +131,8 @@ std::vector<double> scaled_row_sums(const LinkTree& tree, std::span<const Link> 
 /// Changes the factors until the rows of `links` add up to `wanted` [n], as far as their limits
 /// allow.
 void scale_to(const LinkTree& tree, std::span<const Link> links, std::span<const double> wanted,
-              std::span<const RowSumTarget> target, std::vector<double>& factor) {
+              std::span<const RowSumTarget> target, const Limits& limits,
+              std::vector<double>& factor) {
   for (int step = 0; step < kScalingSteps; ++step) {
     const std::vector<double> row = scaled_row_sums(tree, links, factor);
     double worst = 0;
@@ -124,8 +140,7 @@ void scale_to(const LinkTree& tree, std::span<const Link> links, std::span<const
       if (factor[i] == 0) continue;
       worst = std::max(worst, std::abs(row[i] - wanted[i]));
       if (row[i] <= 0 || wanted[i] <= 0) continue;
-      factor[i] = std::clamp(factor[i] * std::sqrt(wanted[i] / row[i]), least_factor(target[i]),
-                             kGreatestFactor);
+      factor[i] = limits.clamp(factor[i] * std::sqrt(wanted[i] / row[i]), target[i]);
     }
     if (worst < kScaled) break;
   }
@@ -137,12 +152,11 @@ bool is_certain(const LinkTree& tree, const Link& link) {
          link.exchange_area == link.unoccluded_area;
 }
 
-/// Divides links between patches by their factors, except by those of patches that see almost
-/// nothing.
+/// Divides links between patches by their factors, except where these are 0.
 void divide(const LinkTree& tree, std::span<const double> factor, std::span<Link> links) {
   const auto of = [&](std::uint32_t leaf) {
     const double f = factor[tree.leaf_patch(tree[leaf])];
-    return f < kLeastFactor ? 1 : f;
+    return f > 0 ? f : 1;
   };
   for (Link& link : links) link.exchange_area /= static_cast<float>(of(link.a) * of(link.b));
 }
@@ -197,16 +211,18 @@ LinkScaling scale_links(const LinkTree& tree, std::span<Link> links,
   std::vector<double> of_rest = wanted;
   const std::vector<double> held = scaled_row_sums(tree, certain, factor);
   for (std::size_t i = 0; i < held.size(); ++i) of_rest[i] -= held[i];
-  scale_to(tree, rest, of_rest, target, factor);
+  scale_to(tree, rest, of_rest, target, kOfRest, factor);
   divide(tree, factor, certain);
   std::vector<double> change = factor;
-  scale_to(tree, links, wanted, target, factor);
+  scale_to(tree, links, wanted, target, kOfAll, factor);
   row = scaled_row_sums(tree, links, factor);
   result.closure.row_sum_error_after = largest_row_error(row, target, /*certain=*/true);
 
   Change squared;
   squared.add(tree, rest, factor);
-  for (std::size_t i = 0; i < change.size(); ++i) change[i] = factor[i] / std::max(change[i], 1e-6);
+  for (std::size_t i = 0; i < change.size(); ++i) {
+    if (change[i] > 0) change[i] = factor[i] / change[i];
+  }
   squared.add(tree, certain, change);
   if (squared.norm > 0) result.closure.relative_change = std::sqrt(squared.change / squared.norm);
   return result;

@@ -28,7 +28,8 @@ struct LinkScaling {
 /// kernels that are taken for affine, and not from single patches with nothing between them. So
 /// the links between those, which move to the front, are divided by the factors of their patches
 /// first, and only what the others leave is scaled off all alike (lab/117). A measured target
-/// counts by its certainty relative to that of the row sum. Factors stay in [0.5, 2], with two
+/// counts by its certainty relative to that of the row sum. Factors stay in [0.5, 2], those of
+/// the others alone in [0.9, 1.1], with two
 /// exceptions: patches that see almost nothing may lose nearly all of their exchange, and where the
 /// target is 0 the factor is 0.
 LinkScaling scale_links(const LinkTree& tree, std::span<Link> links,

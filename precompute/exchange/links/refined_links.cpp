@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "precompute/base/parallel_progress.h"
-#include "precompute/exchange/links/counted_links.h"
+#include "precompute/exchange/links/leaf_links.h"
 #include "precompute/exchange/links/link_scaling.h"
 
 namespace rebounce {
@@ -20,7 +20,7 @@ FormFactorSettings with_more_probes(FormFactorSettings settings) {
   return settings;
 }
 
-/// Traces hemisphere rays, for what escapes and for what the counts of links tell.
+/// Finds what escapes, and what links between single patches exchange.
 class LinkMeasurement {
  public:
   LinkMeasurement(const PatchModel& model, const ShadowRays& shadow_rays, const RayTracer& tracer,
@@ -33,7 +33,7 @@ class LinkMeasurement {
         exchange_(shadow_rays, tracer, counted_, settings) {}
 
   /// Measures `links`, and returns the escape of all patches.
-  std::vector<Escape> run(CountedLinks& links, const Progress& progress) {
+  std::vector<Escape> run(LeafLinks& links, const Progress& progress) {
     std::vector<Escape> escape = trace_hemispheres(links, part_of(progress, 0.0, 0.5));
     ray_count_ += links.measure(geometry_, exchange_, settings_.hemisphere_rays,
                                 settings_.probe_rays, part_of(progress, 0.5, 1.0));
@@ -43,7 +43,7 @@ class LinkMeasurement {
   std::uint64_t ray_count() const { return ray_count_; }
 
  private:
-  std::vector<Escape> trace_hemispheres(CountedLinks& links, const Progress& progress) {
+  std::vector<Escape> trace_hemispheres(LeafLinks& links, const Progress& progress) {
     const std::size_t n = model_.patches.size();
     const PatchTriangles triangles(model_.mesh.triangle_patch, n);
     std::vector<Escape> escape(n);
@@ -52,13 +52,12 @@ class LinkMeasurement {
     {
       EscapeScratch scratch;
       MetPatchCounter counter;
-      CountedLinks::Scratch passages;
 #pragma omp for schedule(dynamic, 16)
       for (std::uint32_t i = 0; i < n; ++i) {
         if (loop.stopped()) continue;
         escape[i] = measure_escape(model_.mesh, model_.shown_patch, triangles[i], i, tracer_,
                                    settings_.hemisphere_rays, settings_.seed, scratch);
-        links.count(i, counter.count(n, scratch.met), passages);
+        links.count(i, counter.count(n, scratch.met));
         loop.advance();
       }
     }
@@ -86,17 +85,17 @@ RefinedLinks refine_links(const PatchModel& model, const ShadowRays& shadow_rays
   LinkRefinement refinement(result.tree, shadow_rays, tracer, settings);
   LinkMeasurement measurement(model, shadow_rays, tracer, settings);
   refinement.run(part_of(progress, 0.0, 0.4));
-  CountedLinks links(result.tree, refinement.links());
+  LeafLinks links(result.tree, refinement.links());
   result.escape = measurement.run(links, part_of(progress, 0.4, 0.5));
   result.target = row_sum_targets(result.escape, settings.hemisphere_rays);
   const std::vector<double> ones(model.patches.size(), 1.0);
   const std::vector<double> sum = gather_links(result.tree, refinement.links(), ones);
   const std::size_t kept = refinement.revise(
       find_doubtful_rows(sum, result.target, kLinkRowSumTolerance), part_of(progress, 0.5, 0.9));
-  CountedLinks revised(result.tree, refinement.links().subspan(kept));
-  // The rays are the same as before, and the counts those of new links.
+  LeafLinks revised(result.tree, refinement.links().subspan(kept));
+  // The rays are the same as before, and the counts those of other pairs.
   if (!revised.empty()) measurement.run(revised, part_of(progress, 0.9, 1.0));
-  result.links.assign(refinement.links().begin(), refinement.links().end());
+  result.links = refinement.take_links();
   result.ray_count = refinement.ray_count() + measurement.ray_count();
   result.candidate_count = refinement.candidate_count();
   return result;
