@@ -35,8 +35,8 @@ class LinkMeasurement {
   /// Measures `links`, and returns the escape of all patches.
   std::vector<Escape> run(LeafLinks& links, const Progress& progress) {
     std::vector<Escape> escape = trace_hemispheres(links, part_of(progress, 0.0, 0.5));
-    ray_count_ += links.measure(geometry_, exchange_, settings_.hemisphere_rays,
-                                settings_.probe_rays, part_of(progress, 0.5, 1.0));
+    ray_count_ +=
+        links.measure(geometry_, exchange_, settings_.probe_rays, part_of(progress, 0.5, 1.0));
     return escape;
   }
 
