@@ -166,16 +166,12 @@ void form_factors(const PreparedLight& lamp, const PatchPointBlock& points, std:
 #pragma omp simd
   for (std::size_t e = 0; e < UnitLightBlock::kPart; ++e) {
     const std::size_t k = begin + e;
-    const float x = middle.x - points.position[0][k];
-    const float y = middle.y - points.position[1][k];
-    const float z = middle.z - points.position[2][k];
-    const float normal_x = points.normal[0][k], normal_y = points.normal[1][k],
-                normal_z = points.normal[2][k];
-    const float along = x * direction.x + y * direction.y + z * direction.z;
-    const float height = x * normal_x + y * normal_y + z * normal_z;
-    const float cosine = direction.x * normal_x + direction.y * normal_y + direction.z * normal_z;
+    const PathFromPoint to_center(middle, points, k);
+    const float along = to_center.along(direction), height = to_center.height(points, k);
+    const float cosine = direction.x * points.normal[0][k] + direction.y * points.normal[1][k] +
+                         direction.z * points.normal[2][k];
     const float amplitude = disc_amplitude(radius, cosine);
-    const float whole = whole_disc(radius, x * x + y * y + z * z, along, height, cosine);
+    const float whole = whole_disc(radius, to_center.squared(), along, height, cosine);
     const bool is_dark = (along >= 0) | (height <= -amplitude);
     const float other = is_dark ? 0.0F : -1.0F;
     factor[e] = (height >= amplitude) & !is_dark ? whole : other;

@@ -47,18 +47,16 @@ void inverse_square(const PreparedLight& lamp, const PatchPointBlock& points, st
   const std::size_t begin = part * UnitLightBlock::kPart;
 #pragma omp simd
   for (std::size_t k = begin; k < begin + UnitLightBlock::kPart; ++k) {
-    const float x = lamp_position.x - points.position[0][k];
-    const float y = lamp_position.y - points.position[1][k];
-    const float z = lamp_position.z - points.position[2][k];
-    const float distance_squared = x * x + y * y + z * z;
+    const PathFromPoint path(lamp_position, points, k);
+    const float distance_squared = path.squared();
     const auto outside = static_cast<float>(distance_squared > 0);
     const float divisor = distance_squared + (1 - outside);
     const float distance = std::sqrt(divisor);
     const float ratio_squared = distance_squared / reach_squared;
     const float window = std::max(0.0F, 1 - ratio_squared * ratio_squared);
-    light.direction[0][k] = x / distance;
-    light.direction[1][k] = y / distance;
-    light.direction[2][k] = z / distance;
+    light.direction[0][k] = path.x / distance;
+    light.direction[1][k] = path.y / distance;
+    light.direction[2][k] = path.z / distance;
     light.distance[k] = outside * distance;
     light.illuminance[k] = outside * window / divisor;
   }
@@ -107,17 +105,16 @@ void flat_places(const PreparedLight& lamp, const PatchPointBlock& points, std::
 #pragma omp simd
   for (std::size_t e = 0; e < UnitLightBlock::kPart; ++e) {
     const std::size_t k = begin + e;
-    const float path_x = middle.x - points.position[0][k] + x[e] * side.x + y[e] * other_side.x;
-    const float path_y = middle.y - points.position[1][k] + x[e] * side.y + y[e] * other_side.y;
-    const float path_z = middle.z - points.position[2][k] + x[e] * side.z + y[e] * other_side.z;
-    const float ahead = path_x * direction.x + path_y * direction.y + path_z * direction.z;
-    const float height =
-        path_x * points.normal[0][k] + path_y * points.normal[1][k] + path_z * points.normal[2][k];
-    const float distance_squared = path_x * path_x + path_y * path_y + path_z * path_z;
-    places.path[0][e] = path_x;
-    places.path[1][e] = path_y;
-    places.path[2][e] = path_z;
-    places.weight[e] = std::max(0.0F, -ahead) * std::max(0.0F, height) /
+    PathFromPoint path(middle, points, k);
+    path.x = path.x + x[e] * side.x + y[e] * other_side.x;
+    path.y = path.y + x[e] * side.y + y[e] * other_side.y;
+    path.z = path.z + x[e] * side.z + y[e] * other_side.z;
+    const float distance_squared = path.squared();
+    places.path[0][e] = path.x;
+    places.path[1][e] = path.y;
+    places.path[2][e] = path.z;
+    places.weight[e] = std::max(0.0F, -path.along(direction)) *
+                       std::max(0.0F, path.height(points, k)) /
                        std::max(distance_squared * distance_squared, kLeastDivisor);
   }
 }

@@ -36,6 +36,24 @@ void inverse_square(const PreparedLight& lamp, const PatchPointBlock& points, st
 void apply_profile(const PreparedLight& lamp, UnitLight& light);
 void apply_profile(const PreparedLight& lamp, std::size_t part, UnitLightBlock& light);
 
+/// The path to `end` from point `k` of a block, metres. In numbers, since loops over vectors of GLM
+/// are not vectorised.
+struct PathFromPoint {
+  float x, y, z;
+
+  PathFromPoint(const glm::vec3& end, const PatchPointBlock& points, std::size_t k)
+      : x(end.x - points.position[0][k]),
+        y(end.y - points.position[1][k]),
+        z(end.z - points.position[2][k]) {}
+
+  float squared() const { return x * x + y * y + z * z; }
+  float along(const glm::vec3& axis) const { return x * axis.x + y * axis.y + z * axis.z; }
+  /// Over the horizon of the point.
+  float height(const PatchPointBlock& points, std::size_t k) const {
+    return x * points.normal[0][k] + y * points.normal[1][k] + z * points.normal[2][k];
+  }
+};
+
 /// Point k of a golden-angle spiral around the unit circle.
 glm::vec2 golden_turn(std::uint32_t k);
 

@@ -80,7 +80,8 @@ void form_factors(const PreparedLight& lamp, const PatchPointBlock& points, std:
               *normal_z = &points.normal[2][begin];
   for (std::size_t c = 0; c < corners.size(); ++c) {
     const glm::vec3 at = corner(lamp, c);
-    auto& [x, y, z, length] = corners[c];
+    PartValues &x = corners[c].x, &y = corners[c].y, &z = corners[c].z;
+    PartValues& length = corners[c].length;
 #pragma omp simd
     for (std::size_t e = 0; e < UnitLightBlock::kPart; ++e) {
       x[e] = at.x - point_x[e];

@@ -62,12 +62,9 @@ void form_factors(const PreparedLight& lamp, const PatchPointBlock& points, std:
 #pragma omp simd
   for (std::size_t e = 0; e < UnitLightBlock::kPart; ++e) {
     const std::size_t k = begin + e;
-    const float x = middle.x - points.position[0][k];
-    const float y = middle.y - points.position[1][k];
-    const float z = middle.z - points.position[2][k];
-    const float height =
-        x * points.normal[0][k] + y * points.normal[1][k] + z * points.normal[2][k];
-    const float distance_squared = x * x + y * y + z * z;
+    const PathFromPoint to_center(middle, points, k);
+    const float height = to_center.height(points, k);
+    const float distance_squared = to_center.squared();
     const float whole = radius * radius * height / (distance_squared * std::sqrt(distance_squared));
     const bool outside = distance_squared > radius * radius;
     const float other = outside & (height <= -radius) ? 0.0F : -1.0F;
@@ -152,13 +149,11 @@ void places_of_part(const PreparedLight& lamp, const PatchPointBlock& points, st
 #pragma omp simd
   for (std::size_t e = 0; e < UnitLightBlock::kPart; ++e) {
     const std::size_t k = begin + e;
-    const float to_x = middle.x - points.position[0][k];
-    const float to_y = middle.y - points.position[1][k];
-    const float to_z = middle.z - points.position[2][k];
-    const Cone cone(radius_squared, to_x * to_x + to_y * to_y + to_z * to_z);
+    const PathFromPoint to_center(middle, points, k);
+    const Cone cone(radius_squared, to_center.squared());
     const DirectionInCone way(cone, u[e], v[e]);
-    const float axis_x = to_x / cone.distance, axis_y = to_y / cone.distance,
-                axis_z = to_z / cone.distance;
+    const float axis_x = to_center.x / cone.distance, axis_y = to_center.y / cone.distance,
+                axis_z = to_center.z / cone.distance;
     const Across across(axis_x, axis_y, axis_z);
     const float x = way.cosine * axis_x + way.first * across.first_x + way.second * across.second_x;
     const float y = way.cosine * axis_y + way.first * across.first_y + way.second * across.second_y;

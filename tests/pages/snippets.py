@@ -2,7 +2,8 @@
 """Runs every command and snippet of README.md and the guide, in the order of the pages.
 
 A fenced block of a page is
-  sh                run by bash, in ~/tour (README's and those of install.md: in the checkout)
+  sh                run by bash, in ~/tour (README's, those of install.md and what begins with ./dev:
+                    in the checkout)
   X title="NAME"    written to NAME in that folder
   cpp, c            without a title: all of a page are one program, which is compiled against the
                     installed package and run; statements go into main, in order
@@ -211,6 +212,8 @@ def run_page(sandbox, page):
         elif language == "sh":
             script = sandbox.work / "block.sh"
             script.write_text(code, encoding="utf-8")
+            if code.startswith("./dev "):
+                folder = sandbox.checkout
             sandbox.run(["bash", "-euo", "pipefail", script], folder, where)
         elif language in ("cpp", "c", "python"):
             snippets.setdefault(language, []).append(code)

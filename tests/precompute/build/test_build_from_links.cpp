@@ -31,6 +31,13 @@ constexpr double kErrorInNooks = 0.15;
 // What rows of closed rooms may be off: scaling stops after a number of steps.
 constexpr double kClosure = 1e-3;
 
+// What is said counts what the process holds, and the address sanitizer keeps what was freed.
+#ifdef __SANITIZE_ADDRESS__
+constexpr bool kGivesMemoryBack = false;
+#else
+constexpr bool kGivesMemoryBack = true;
+#endif
+
 const std::string kScenes = REBOUNCE_SOURCE_DIR "/tests/scenes/";
 const std::string kRoom = kScenes + "furnished_room.gltf";
 const std::string kBareRoom = kScenes + "white_room.gltf";
@@ -212,24 +219,29 @@ TEST(BuildFromLinks, SaysAgainWhatIsLeftWhenLinksAreKnown) {
   EXPECT_EQ(estimates[0].link_count, 0U);
   EXPECT_EQ(estimates[1].link_count, report.link_count);
   EXPECT_EQ(estimates[1].patch_count, report.patch_count);
-  EXPECT_LT(estimates[1].peak_bytes, estimates[0].peak_bytes) << "a bare room";
+  if (kGivesMemoryBack) {
+    EXPECT_LT(estimates[1].peak_bytes, estimates[0].peak_bytes) << "a bare room";
+  }
   EXPECT_EQ(report.estimate_after_links->peak_bytes, estimates[1].peak_bytes);
 }
 
 TEST(BuildFromLinks, RefusesWhatIsOverTheLimitWithTheNumbers) {
   BuildSettings settings = quick_settings();
-  const std::uint64_t least = least_memory(settings);
   settings.memory_limit_bytes = 1 << 20;
-  const std::string refusal = test::error_of([&] { build(kBareRoom, settings); });
+  BuildReport report;
+  const std::string refusal =
+      test::error_of([&] { build_transfer_data(kBareRoom, settings, report); });
   EXPECT_NE(refusal.find(" patches (from "), std::string::npos) << refusal;
   const std::string need = " need about ";
   ASSERT_NE(refusal.find(need), std::string::npos) << refusal;
   const double gib = std::stod(refusal.substr(refusal.find(need) + need.size()));
-  EXPECT_NEAR(gib * (1 << 30), least, 0.01 * least);
+  const auto said = static_cast<double>(report.estimate.peak_bytes);
+  EXPECT_NEAR(gib * (1 << 30), said, 0.01 * said);
   EXPECT_NE(refusal.find("the limit is 0.000977 GiB"), std::string::npos) << refusal;
 }
 
 TEST(BuildFromLinks, LinksAreTakenWherePairsAreOverTheLimit) {
+  if (!kGivesMemoryBack) GTEST_SKIP() << "the address sanitizer keeps memory that was freed";
   const auto peak_bytes = [&](ExchangeSource kind, std::uint64_t limit) {
     BuildSettings settings;
     settings.subdivision.patch_count = 8000;  // of fewer, links do not take much less
