@@ -67,9 +67,9 @@ constexpr std::size_t kLinkBytesKept = kFlatLinkBytes + LinkedFormFactors::kByte
 // A patch beside links: compressed form factors and what they are fitted to, without the lights.
 constexpr std::size_t kPatchBytes = 3000;
 
-// The links of a patch over the cube root of the number of patches: furnished rooms have 7.5 to 10
-// (lab/059), empty ones a quarter of it.
-constexpr double kLinksOfPatch = 7;
+// The links of a patch over the cube root of the number of patches: furnished rooms have 10 to 16
+// at the default tolerance, empty ones half of it (lab/117).
+constexpr double kLinksOfPatch = 10;
 
 std::string in_gib(std::uint64_t bytes) {
   return fmt::format("{:.3g} GiB", static_cast<double>(bytes) / (1ULL << 30));
