@@ -1,9 +1,13 @@
+#include <algorithm>
+#include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "bench/reference/compare.h"
 #include "bench/reference/error_sum.h"
 #include "bench/reference/scene_surface.h"
 #include "precompute/patches/lit_sides.h"
+#include "precompute/sampling/hemisphere_rays.h"
 #include "rebounce/error.h"
 #include "runtime/outputs/vertex_light.h"
 #include "runtime/rays/float3_glm.h"
@@ -18,6 +22,12 @@ constexpr double kSameSideCosine = 0.99;
 /// A point whose view is back faces by more than this is hidden: the floor under a box, or a
 /// ceiling a hair's breadth above a lamp. What the mesh shows there, nobody sees.
 constexpr float kHidden = 0.98F;
+
+/// A point is seen if more than this part of its rays goes on for this part of the root of the
+/// area.
+constexpr double kLeastSeen = 0.05, kSight = 1.0 / 64;
+
+constexpr std::size_t kSightRays = 256;
 
 /// A point of the display mesh.
 struct MeshPoint {
@@ -55,6 +65,32 @@ class MeshLocator {
   std::vector<CoincidentSide> sides_;
 };
 
+/// Tells which points are seen from afar.
+class Sight {
+ public:
+  Sight(const PatchTable& patches, const RayTracer& tracer)
+      : far_(kSight * std::sqrt(std::accumulate(patches.area.begin(), patches.area.end(), 0.0))),
+        tracer_(tracer),
+        rays_(kSightRays),
+        hits_(kSightRays) {}
+
+  bool sees(const SurfacePoint& point) {
+    from_.assign(kSightRays, {point.position, point.normal});
+    make_hemisphere_rays(from_, tracer_, {0.5, 0.5}, rays_);
+    for (Ray& ray : rays_) ray.t_far = static_cast<float>(far_);
+    tracer_.intersect(rays_, hits_);
+    const auto free = std::ranges::count(hits_, kNone, &Hit::triangle);
+    return static_cast<double>(free) > kLeastSeen * kSightRays;
+  }
+
+ private:
+  double far_;  ///< metres
+  const RayTracer& tracer_;
+  std::vector<PatchPoint> from_;
+  std::vector<Ray> rays_;
+  std::vector<Hit> hits_;
+};
+
 Float3 interpolated(const DisplayMesh& mesh, std::span<const Float3> at_vertices,
                     const MeshPoint& point) {
   glm::dvec3 value(0);
@@ -86,7 +122,8 @@ ReconstructionComparison compare_reconstruction(const TransferData& data,
   }
   clamp_light(at_vertices);
   MeshLocator locator(data.mesh, mesh_tracer);
-  ErrorSum sum;
+  Sight sight(data.patches, mesh_tracer);
+  ErrorSum sum, seen;
   ReconstructionComparison comparison;
   std::size_t left_out = 0;
   for (std::size_t k = 0; k < points.size(); ++k) {
@@ -100,8 +137,10 @@ ReconstructionComparison compare_reconstruction(const TransferData& data,
     comparison.triangle.push_back(place->triangle);
     comparison.shown.push_back(shown);
     sum.add(1, shown, truth.mean[k], truth.standard_error[k]);
+    if (sight.sees(points[k])) seen.add(1, shown, truth.mean[k], truth.standard_error[k]);
   }
   comparison.relative = sum.result(left_out);
+  comparison.seen = seen.result(points.size() - seen.count());
   return comparison;
 }
 

@@ -23,6 +23,8 @@ class ErrorSum {
     ++count_;
   }
 
+  std::size_t count() const { return count_; }
+
   /// No error where there is neither light nor difference; an infinite one where there is only a
   /// difference.
   RelativeError result(std::size_t left_out_count) const {

@@ -45,7 +45,7 @@ FormFactorQuality quality_named(const std::string& name) {
 /// One row of the result.
 struct Row {
   std::size_t patch_count = 0;
-  reference::RelativeError patch_means, reconstruction;
+  reference::RelativeError patch_means, reconstruction, seen;
   reference::ReceiverErrors receivers;  ///< if they are asked for
 };
 
@@ -91,7 +91,7 @@ class TruthBench {
     if (last && !options_.point_csv.empty()) {
       reference::write_point_table(options_.point_csv, solution.data, points_, truth_, shown);
     }
-    Row row{solution.data.patches.size(), patches.relative, shown.relative, {}};
+    Row row{solution.data.patches.size(), patches.relative, shown.relative, shown.seen, {}};
     if (options_.receivers) {
       row.receivers = reference::compare_receivers(
           {solution.data, solution.tracer, solution.indirect_irradiance, setup_.lights, setup_.sky},
@@ -161,7 +161,9 @@ void run(const Options& options) {
                                    "reconstruction_error",
                                    "reconstruction_noise",
                                    "points_compared",
-                                   "points_left_out"};
+                                   "points_left_out",
+                                   "seen_error",
+                                   "points_seen"};
   if (options.receivers) {
     columns.insert(columns.end(), {"patch_value_error", "row_error", "smooth_light_error",
                                    "exact_lamp_error", "exact_both_error"});
@@ -181,7 +183,9 @@ void run(const Options& options) {
                                             shown.error,
                                             shown.noise,
                                             shown.count,
-                                            shown.left_out_count};
+                                            shown.left_out_count,
+                                            row.seen.error,
+                                            row.seen.count};
       if (options.receivers) {
         const reference::ReceiverErrors& of = row.receivers;
         for (const auto& e :

@@ -10,7 +10,6 @@
 #include "precompute/lights/random_lights.h"
 #include "precompute/outputs/receiver_sets.h"
 #include "precompute/outputs/receiver_views.h"
-#include "precompute/patches/covers.h"
 #include "rebounce/error.h"
 #include "runtime/rays/triangle.h"
 #include "transfer/base/grouped.h"
@@ -29,7 +28,7 @@ constexpr std::size_t kLights = 32;
 // the scene's root mean square.
 constexpr float kDim = 0.1F;
 
-// A vertex gets no row if its share of the surface is more than this part of a patch (lab/109).
+// A vertex gets no row if its share of the surface is more than this part of a patch (lab/118).
 constexpr double kLargestShare = 0.5;
 
 // Of light on single patches, beside lamps (lab/109).
@@ -178,7 +177,7 @@ class RowBuilder {
 
   void add_batch(std::span<const std::uint32_t> vertices) {
     std::vector<VertexRow> found(vertices.size());
-    const double cover = close_cover_height();
+    const double sight = mean_patch_size();
 #pragma omp parallel
     {
       ReceiverViewer viewer(data_.mesh, shown_patch_, data_.patches.size(), tracer_,
@@ -187,7 +186,7 @@ class RowBuilder {
 #pragma omp for schedule(dynamic, 16)
       for (std::size_t k = 0; k < vertices.size(); ++k) {
         ViewRow row;
-        viewer.look_from_vertex(vertices[k], triangles_[vertices[k]], cover, row);
+        viewer.look_from_vertex(vertices[k], triangles_[vertices[k]], sight, row);
         if (!row.empty()) found[k] = compare(vertices[k], row, sum);
       }
     }
@@ -360,9 +359,9 @@ class RowBuilder {
     rows_.vertex.resize(std::size_t{kGroup} * rows_.group_count(), kNone);
   }
 
-  double close_cover_height() const {
+  double mean_patch_size() const {
     const double whole = std::accumulate(data_.patches.area.begin(), data_.patches.area.end(), 0.0);
-    return kCloseCover * std::sqrt(whole / static_cast<double>(data_.patches.size()));
+    return std::sqrt(whole / static_cast<double>(data_.patches.size()));
   }
 
   const TransferData& data_;

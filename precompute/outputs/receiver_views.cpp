@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/glm.hpp>
+#include <numeric>
 
 #include "precompute/sampling/hemisphere_rays.h"
 #include "runtime/rays/cumulative_choice.h"
@@ -19,11 +20,8 @@ constexpr glm::dvec2 kPlaceShift{0.25, 0.75}, kDirectionShift{0.5, 0.5};
 // How much of the dual function is in the weights of a vertex; the rest is the hat function.
 constexpr double kDualPart = 0.75;  // lab/109
 
-// A cover faces what it covers: the cosine between their normals is below this.
-constexpr double kFacing = -0.7;
-
-// If less than this part of a vertex's surface is open, it counts as hidden.
-constexpr double kLeastOpen = 0.125;
+// The weight of places that are not seen, beside that of those that are: it decides where none is.
+constexpr double kUnseen = 1.0 / 64;
 
 /// Points on the triangles around a vertex, evenly by area.
 class RingPoints {
@@ -102,14 +100,31 @@ void ReceiverViewer::look_from_patch(std::span<const std::uint32_t> triangles, V
   take(row);
 }
 
-bool ReceiverViewer::is_hidden(std::size_t ray, double cover) const {
-  const Hit& hit = hit_[ray];
-  if (hit.triangle == kNone) return false;
-  if (meets_back(mesh_, hit)) return true;
-  const glm::dvec3 normal = to_dvec3(point_[ray].normal);
-  if (glm::dot(normal, to_dvec3(ray_[ray].direction)) * hit.t >= cover) return false;
-  const glm::dvec3 other = front_normal(corners_of(mesh_, hit.triangle));
-  return glm::dot(normal, hit.front ? other : -other) < kFacing;
+double ReceiverViewer::keep_seen(double sight) {
+  const std::size_t count = point_.size();
+  NormalFrame frame;
+  for (std::size_t k = 0; k < count; ++k) {
+    // Independent of the rays that bring light: at random, and not by their sequence.
+    const glm::vec3 direction = to_cosine_direction(unit_square(mix_bits(k)));
+    ray_[k] = make_free_ray(point_[k], frame.turn(point_[k].normal, direction), tracer_);
+    ray_[k].t_far = static_cast<float>(sight);
+  }
+  tracer_.intersect(ray_, hit_);
+  const auto seen_count = static_cast<double>(std::ranges::count(hit_, kNone, &Hit::triangle));
+  const double step = (seen_count + kUnseen * (static_cast<double>(count) - seen_count)) /
+                      static_cast<double>(count);
+  const std::vector<PatchPoint> place = point_;
+  const std::vector<double> height = height_;
+  double reached = 0;  // by the places before `next`
+  std::size_t next = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    while (next < count && reached <= (static_cast<double>(k) + 0.5) * step) {
+      reached += hit_[next++].triangle == kNone ? 1 : kUnseen;
+    }
+    point_[k] = place[next - 1];
+    height_[k] = height[next - 1];
+  }
+  return seen_count / static_cast<double>(count);
 }
 
 // The dual functions of the hat functions h_v over the triangles around v are 4 h_v - 1: their
@@ -118,34 +133,23 @@ bool ReceiverViewer::is_hidden(std::size_t ray, double cover) const {
 // (B. Wohlmuth, "A mortar finite element method using dual spaces for the Lagrange multiplier",
 // 2000). The mean with the hat function itself, 3 h_v, flattens the light and is less noisy.
 void ReceiverViewer::look_from_vertex(std::uint32_t vertex,
-                                      std::span<const std::uint32_t> triangles, double cover,
+                                      std::span<const std::uint32_t> triangles, double sight,
                                       ViewRow& row) {
   row.clear();
   const RingPoints ring(mesh_, vertex, triangles);
   if (ring.empty()) return;
   const PointSequence places = r2_sequence(kPlaceShift);
   for (std::uint32_t k = 0; k < point_.size(); ++k) point_[k] = ring.at(places[k], height_[k]);
+  const double seen = keep_seen(sight);
   trace();
-  std::vector<bool> hidden(ray_.size());
-  double all = 0, open = 0, dual = 0;
-  const auto dual_of = [](double height) { return kDualPart * (3 * height - 1); };
-  for (std::size_t k = 0; k < ray_.size(); ++k) {
-    hidden[k] = is_hidden(k, cover);
-    all += height_[k];
-    if (!hidden[k]) open += height_[k];
-  }
-  if (open < kLeastOpen * all) {
-    hidden.assign(ray_.size(), false);
-    open = all;
-  }
-  for (std::size_t k = 0; k < ray_.size(); ++k) {
-    if (!hidden[k]) dual += dual_of(height_[k]);
-  }
+  // Where little is seen, to go on from there to the vertex would be noisy.
+  const double dual_part = kDualPart * seen;
+  const double heights = std::accumulate(height_.begin(), height_.end(), 0.0);
   // What the dual function adds has the sum 0 also where a part is left out.
-  for (std::size_t k = 0; k < ray_.size(); ++k) {
-    if (hidden[k]) continue;
-    const double weight = height_[k] * (1 - dual / open) + dual_of(height_[k]);
-    add(patch_at(mesh_, shown_patch_, hit_[k]), weight / open);
+  const double mean = 3 - static_cast<double>(height_.size()) / heights;
+  for (std::size_t k = 0; k < height_.size(); ++k) {
+    const double dual = 3 * height_[k] - 1 - mean * height_[k];
+    add(patch_at(mesh_, shown_patch_, hit_[k]), (height_[k] + dual_part * dual) / heights);
   }
   take(row);
 }

@@ -32,15 +32,16 @@ class ReceiverViewer {
   void look_from_patch(std::span<const std::uint32_t> triangles, ViewRow& row);
 
   /// The value that the light on the `triangles` around a vertex gives it: that of the linear
-  /// function over each of them which is nearest to the light there. What lies close above hides
-  /// the surface, and what is hidden is left out; if nearly all is hidden, nothing is. `cover` is
-  /// the height in metres below which something is close.
+  /// function over each of them which is nearest to the light there. Places count by how much they
+  /// are seen from farther away than `sight` metres: the part of a wall that stands out from under
+  /// a cornice shows its own light, not that of the slot behind.
   void look_from_vertex(std::uint32_t vertex, std::span<const std::uint32_t> triangles,
-                        double cover, ViewRow& row);
+                        double sight, ViewRow& row);
 
  private:
   void trace();
-  bool is_hidden(std::size_t ray, double cover) const;
+  /// Replaces places that are not seen by those that are; returns the part that is.
+  double keep_seen(double sight);
   void add(std::uint32_t patch, double part);
   void take(ViewRow& row);
 

@@ -104,6 +104,32 @@ TEST(Reconstruction, EveryPointIsFoundOnTheMesh) {
   EXPECT_NEAR(off.error, 0.1, 1e-6);
 }
 
+TEST(Reconstruction, PointsInASlotAreNotSeen) {
+  Scene scene = test::empty_scene({0.5F, 0.5F, 0.5F});
+  test::add_box(scene, {0, 0, 0}, {3, 2, 2}, true);
+  test::add_box(scene, {0.5, 0.01, 0.5}, {2.5, 0.2, 1.5}, false);
+  const PatchModel model = make_patch_model(scene, {.patch_count = 200});
+  TransferData data = test::data_of(model);
+  const RayTracer tracer = make_surface_tracer(data.mesh);
+  compute_reconstruction_weights(model.shown_patch, data.patches.absorbed, tracer, data.mesh);
+  FurnacePoints f(scene);
+  std::size_t in_slot = 0;
+  for (std::size_t k = 0; k < f.points.size(); ++k) {
+    const auto& [x, y, z] = f.points[k].position;
+    if (y > 0.011F || x < 0.5F || x > 2.5F || z < 0.5F || z > 1.5F) continue;
+    f.truth.mean[k] = {0, 0, 0};
+    ++in_slot;
+  }
+  ASSERT_GT(in_slot, 20U);
+  const ReconstructionComparison shown = compare_reconstruction(
+      data, tracer, std::vector<Float3>(data.patches.size(), Float3{2, 2, 2}), f.points, f.truth);
+  EXPECT_GT(shown.relative.error, 0.2);
+  // Some at its border are.
+  EXPECT_LT(shown.seen.error, 0.15);
+  EXPECT_GE(shown.seen.left_out_count, in_slot - 12);
+  EXPECT_LE(shown.seen.left_out_count, in_slot + 1);
+}
+
 TEST(Reconstruction, IsLinearBetweenVertices) {
   // Each vertex takes its own x from one patch that holds 1: the value at a point is its x.
   Furnace furnace;

@@ -6,6 +6,7 @@
 
 #include "precompute/build/transfer_build.h"
 #include "precompute/outputs/receiver_sets.h"
+#include "precompute/outputs/receiver_views.h"
 #include "rebounce/outputs.h"
 #include "runtime/outputs/vertex_light.h"
 #include "runtime/rays/triangle.h"
@@ -156,6 +157,73 @@ TEST(ReceiverRows, RefuseWhatCannotBe) {
   TransferData without = data;
   without.transfer = nullptr;
   test::expect_error([&] { make(without, {}); }, "need an operator");
+}
+
+/// A floor of patch 0, 2 m by 1 m. A shelf of patch 1 covers it from x = 1 on, at a height of 2 cm;
+/// far above is a ceiling of patch 2.
+struct Shelf {
+  DisplayMesh mesh;
+
+  Shelf() {
+    add_rectangle({0, 1}, {0, 1}, 0, true, 0);
+    add_rectangle({1, 2}, {0, 1}, 0, true, 0);
+    add_rectangle({1, 9}, {-8, 9}, 0.02F, false, 1);
+    add_rectangle({-50, 50}, {-50, 50}, 4, false, 2);
+    mesh.back_triangle.assign(mesh.triangle.size(), kNone);
+  }
+
+  /// The part of patch `seen` in the row of the vertex at the corner `x` of the floor.
+  float part(float x, std::uint32_t seen) const {
+    const RayTracer tracer = make_surface_tracer(mesh);
+    ReceiverViewer viewer(mesh, mesh.triangle_patch, 3, tracer, 4096);
+    std::uint32_t vertex = 0;
+    std::vector<std::uint32_t> around;
+    for (std::uint32_t t = 0; t < 4; ++t) {
+      for (const std::uint32_t v : mesh.triangle[t]) {
+        if (mesh.position[v] != Float3{x, 0, 0}) continue;
+        vertex = v;
+        around.push_back(t);
+      }
+    }
+    ViewRow row;
+    viewer.look_from_vertex(vertex, around, 1, row);
+    for (const auto& [patch, part] : row) {
+      if (patch == seen) return part;
+    }
+    return 0;
+  }
+
+ private:
+  /// The vertices of the floor are shared.
+  std::uint32_t vertex_at(const Float3& place) {
+    const auto found = std::ranges::find(mesh.position, place);
+    if (found == mesh.position.end()) mesh.position.push_back(place);
+    return static_cast<std::uint32_t>(std::ranges::find(mesh.position, place) -
+                                      mesh.position.begin());
+  }
+
+  /// A level rectangle that faces up or down.
+  void add_rectangle(const Float2& x, const Float2& z, float y, bool is_up, std::uint32_t patch) {
+    const std::uint32_t a = vertex_at({x[0], y, z[0]}), b = vertex_at({x[0], y, z[1]});
+    const std::uint32_t c = vertex_at({x[1], y, z[1]}), d = vertex_at({x[1], y, z[0]});
+    mesh.triangle.push_back(is_up ? Uint3{a, b, c} : Uint3{a, c, b});
+    mesh.triangle.push_back(is_up ? Uint3{a, c, d} : Uint3{a, d, c});
+    mesh.triangle_patch.insert(mesh.triangle_patch.end(), 2, patch);
+  }
+};
+
+TEST(ReceiverViews, AVertexAtTheBorderOfACoverShowsWhatIsSeen) {
+  const Shelf shelf;
+  // If all of its triangles counted alike, half would be the shelf's. Some of it is seen at its
+  // rim.
+  EXPECT_GT(shelf.part(1, 2), 0.8 * shelf.part(0, 2));
+  EXPECT_LT(shelf.part(1, 1), 0.2);
+}
+
+TEST(ReceiverViews, AVertexUnderACoverShowsItsOwnLight) {
+  const Shelf shelf;
+  EXPECT_GT(shelf.part(2, 1), 0.5);
+  EXPECT_LT(shelf.part(2, 2), 0.5);
 }
 
 /// Patches of a strip, and receivers that see some of them.
