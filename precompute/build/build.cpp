@@ -108,7 +108,7 @@ class TransferBuild {
     if (links && decided_.operator_kind != OperatorKind::kNoOperator) {
       LinkedBuild build =
           linked_build(built_scene(model_.patches.size(), model_.mesh), report_.link_count,
-                       model_.patches.reflectance, roles_, decided_.tolerance);
+                       model_.patches.reflectance, roles_, kCompressionPart * decided_.tolerance);
       build.row_bytes = bytes_of_receiver_rows(model_, decided_.receiver_rows);
       std::uint64_t& limit = decided_.memory_limit_bytes;
       announce(report_.estimate_after_links.emplace(estimate_after_links(build, limit)));

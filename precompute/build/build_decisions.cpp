@@ -56,7 +56,9 @@ BuildSettings decide(BuildSettings settings, const PatchModel& model) {
   if (!links && link_epsilon > 0) {
     throw Error("the error of a link is for form factors from links; ask for these");
   }
-  if (links && link_epsilon == 0) link_epsilon = kLinkEpsilon;
+  if (links && link_epsilon == 0) {
+    link_epsilon = kLinkEpsilon * (settings.tolerance / kDefaultTolerance);
+  }
   if (links && settings.form_factor_tolerance == 0 && !restricted_roles) {
     settings.form_factor_tolerance = settings.tolerance / kToleranceOverFormFactors;
   }

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "precompute/base/process_memory.h"
+#include "precompute/build/operator_stage.h"
 #include "precompute/compression/matrix_free_plan.h"
 #include "precompute/exchange/pairs/closure.h"
 #include "precompute/exchange/pairs/form_factors.h"
@@ -51,8 +52,9 @@ constexpr std::size_t kThreadBytesOfPatch = 5'000, kMostThreadBytes = 10'000'000
 // Copies of the factors of a low-rank operator while they are found.
 constexpr std::size_t kFactorCopies = 6;
 
-// A link during refinement: the link, its copy, and the flat arrays.
-constexpr std::size_t kLinkBytesFound = 100;
+// A link during refinement: the link with room to grow, its copy, and what its rays are counted in
+// or the flat arrays.
+constexpr std::size_t kLinkBytesFound = 130;
 // A patch then, as from pairs.
 constexpr std::size_t kPatchBytesOfLinks = 17'500;
 
@@ -65,9 +67,9 @@ constexpr std::size_t kLinkBytesKept = kFlatLinkBytes + LinkedFormFactors::kByte
 // A patch beside links: compressed form factors and what they are fitted to, without the lights.
 constexpr std::size_t kPatchBytes = 3000;
 
-// The links of a patch over the cube root of the number of patches: furnished rooms have 7.5 to 10
-// (lab/059), empty ones a quarter of it.
-constexpr double kLinksOfPatch = 7;
+// The links of a patch over the cube root of the number of patches: furnished rooms have 10 to 16
+// at the default tolerance, empty ones half of it (lab/117).
+constexpr double kLinksOfPatch = 10;
 
 std::string in_gib(std::uint64_t bytes) {
   return fmt::format("{:.3g} GiB", static_cast<double>(bytes) / (1ULL << 30));
@@ -185,9 +187,12 @@ CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
         bytes_of_receiver_rows(model, decided.receiver_rows);
     return estimate;
   }
-  const LinkedBuild build{
-      scene, resident_memory_bytes(), usual_link_count(scene.patch_count), matrices,
-      roles, decided.tolerance};
+  const LinkedBuild build{scene,
+                          resident_memory_bytes(),
+                          usual_link_count(scene.patch_count),
+                          matrices,
+                          roles,
+                          kCompressionPart * decided.tolerance};
   estimate.peak_bytes = peak_bytes_of_links(build);
   if (decided.operator_kind != OperatorKind::kNoOperator) {
     estimate.peak_bytes =

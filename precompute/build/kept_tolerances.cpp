@@ -37,7 +37,8 @@ void check_tolerances(const BuildRecord& record, const BuildReport& report, bool
     throw Error(fmt::format(
         "the light misses the tolerance: with what links are off, the mean error is {:.2g}, the "
         "tolerance {:.2g}; compression alone is off by {:.2g}, links by {:.2g}; the file is "
-        "written: count it as one of tolerance {:.2g}, or take --form-factors pairs",
+        "written: count it as one of tolerance {:.2g}, or take a smaller --link-epsilon or "
+        "--form-factors pairs",
         whole.mean, record.tolerance, record.error_mean, links.mean, whole.mean));
   }
   if (has_form_factors && report.form_factor_error->mean > report.form_factor_tolerance) {

@@ -117,11 +117,12 @@ void make_operator_from_links(const RayTracer& tracer, std::span<const std::uint
                               TransferData& data, BuildReport& report, PhaseClock& clock) {
   const PatchTable& patches = data.patches;
   const std::uint64_t seed = decided.form_factors.seed;
+  const double tolerance = kCompressionPart * decided.tolerance;
   const LinkedBuild build{.scene = built_scene(patches.size(), data.mesh),
                           .link_count = data.links.pair.size(),
                           .matrix_count = distinct_channels(patches.reflectance),
                           .roles = roles,
-                          .tolerance = decided.tolerance};
+                          .tolerance = tolerance};
   // Used from the first light to the last check, so it is made once.
   const auto links =
       std::make_shared<const LinkedFormFactors>(data.links, patches.area, patches.centroid);
@@ -142,7 +143,7 @@ void make_operator_from_links(const RayTracer& tracer, std::span<const std::uint
   });
   data.transfer = clock.run("operator", [&](const Progress& part) {
     MatrixFreeTransferSettings settings;
-    settings.compression = {decided.tolerance, *decided.precision};
+    settings.compression = {tolerance, *decided.precision};
     settings.roles = roles;
     settings.memory_limit_bytes = memory_of_matrix_free_transfer(build, decided.memory_limit_bytes);
     settings.checkpoint = decided.checkpoint;

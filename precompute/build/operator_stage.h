@@ -22,6 +22,11 @@ namespace rebounce {
 /// Their error adds to its own.
 inline constexpr double kToleranceOverFormFactors = 5;  // lab/060
 
+/// The parts of the tolerance that links and the compression of an operator from links may take.
+/// Their errors are independent of each other, so that the squares of the parts add up to 1. Finer
+/// links cost time offline, finer operators bytes and time in each frame.
+inline constexpr double kLinksPart = 0.6, kCompressionPart = 0.8;
+
 /// Lights that compressed form factors are measured under.
 inline constexpr int kFormFactorLightCount = 16;
 

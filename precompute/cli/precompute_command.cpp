@@ -244,8 +244,10 @@ void add_form_factor_options(CLI::App& command, PrecomputeOptions& chosen) {
       ->check(CLI::IsMember({"low", "default", "high"}))
       ->capture_default_str();
   command
-      .add_option("--link-epsilon", chosen.settings.form_factors.link_epsilon,
-                  "Largest error of a link, with --form-factors links; 0: the default, 0.0005")
+      .add_option(
+          "--link-epsilon", chosen.settings.form_factors.link_epsilon,
+          "Largest error of a link, with --form-factors links; 0: the default, 0.00015 at the "
+          "default tolerance and in proportion to it")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   command.add_flag("--store-links", chosen.settings.store_links,

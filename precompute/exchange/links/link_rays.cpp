@@ -13,25 +13,6 @@ constexpr int kEnoughRays = 6;
 
 }  // namespace
 
-LinkRays::Visibility LinkRays::trace(std::uint32_t a, std::uint32_t b, int count,
-                                     Scratch& scratch) const {
-  if (!tree_[a].is_leaf() || !tree_[b].is_leaf()) return trace_nodes(a, b, count, scratch);
-  const std::uint32_t i = tree_.leaf_patch(tree_[a]), j = tree_.leaf_patch(tree_[b]);
-  return trace_patches(std::min(i, j), std::max(i, j), count, scratch);
-}
-
-LinkRays::Visibility LinkRays::trace_patches(std::uint32_t i, std::uint32_t j, int count,
-                                             Scratch& scratch) const {
-  scratch.facing.assign(1, {j, 0});
-  shadow_rays_.make_rays(i, scratch.facing, count, scratch.rays);
-  trace(scratch);
-  const auto agreement = ShadowRays::agreement(scratch.rays, scratch.transmitted);
-  if (agreement == ShadowRays::Agreement::kClear) return {.part = 1};
-  if (agreement == ShadowRays::Agreement::kHidden) return {.part = 0};
-  const ShadowRays::Visibility visible = ShadowRays::visibility(scratch.rays, scratch.transmitted);
-  return {.part = visible.part, .variance = visible.variance, .mixed = true};
-}
-
 /// As for form factors of pairs: where a surface has holes, the mean of a triangle is used.
 void LinkRays::trace(Scratch& scratch) const {
   scratch.transmitted.resize(scratch.rays.size());
@@ -58,8 +39,8 @@ bool LinkRays::is_divided(const Scratch& scratch, std::span<const int> children)
   return false;
 }
 
-LinkRays::Visibility LinkRays::trace_nodes(std::uint32_t a, std::uint32_t b, int count,
-                                           Scratch& scratch) const {
+LinkRays::Visibility LinkRays::trace(std::uint32_t a, std::uint32_t b, int count,
+                                     Scratch& scratch) const {
   const std::uint64_t hash =
       mix_bits(seed_ * 0x9E3779B9ULL + ((static_cast<std::uint64_t>(a) << 32) | b));
   const glm::dvec2 shift = unit_square(mix_bits(hash));
@@ -92,11 +73,11 @@ LinkRays::Visibility LinkRays::judge(const Scratch& scratch, std::span<const dou
                                      std::span<const int> children) {
   VisibilityEstimate estimate;
   for (std::size_t k = 0; k < weight.size(); ++k) estimate.add(weight[k], scratch.transmitted[k]);
-  if (estimate.is_empty()) return {1, 1, 1, true, true};  // no ray has weight
+  if (estimate.is_empty()) return {1, 1, true, true};  // no ray has weight
   const bool divided = estimate.part() > 0 && is_divided(scratch, children);
   const bool mixed = divided || ShadowRays::agreement(scratch.rays, scratch.transmitted) ==
                                     ShadowRays::Agreement::kMixed;
-  return {estimate.part(), estimate.variance(), estimate.spread(), mixed, divided};
+  return {estimate.part(), estimate.spread(), mixed, divided};
 }
 
 }  // namespace rebounce

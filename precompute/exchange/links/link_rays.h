@@ -19,7 +19,6 @@ class LinkRays {
   struct Scratch {
     std::vector<Ray> rays;
     std::vector<float> transmitted;  ///< by ray
-    std::vector<FacingPatch> facing;
   };
 
   LinkRays(const LinkTree& tree, const ShadowRays& shadow_rays, const RayTracer& tracer,
@@ -28,19 +27,15 @@ class LinkRays {
 
   struct Visibility {
     double part = 0;       ///< fraction of the light of the pair that passes, [0, 1]
-    double variance = 0;   ///< of `part`
     double spread = 0;     ///< variance of single rays
     bool mixed = false;    ///< the nodes see each other in part
     bool divided = false;  ///< mixed, and two of the children do not see each other at all
   };
 
-  /// The visibility from `count` <= kMostRays rays between points spread over two nodes. Two
-  /// patches get the rays of ShadowRays.
+  /// The visibility from `count` <= kMostRays rays between points spread over two nodes.
   Visibility trace(std::uint32_t a, std::uint32_t b, int count, Scratch& scratch) const;
 
  private:
-  Visibility trace_patches(std::uint32_t i, std::uint32_t j, int count, Scratch& scratch) const;
-  Visibility trace_nodes(std::uint32_t a, std::uint32_t b, int count, Scratch& scratch) const;
   double first_part(const LinkNode& node) const;
   void trace(Scratch& scratch) const;
   static Visibility judge(const Scratch& scratch, std::span<const double> weight,

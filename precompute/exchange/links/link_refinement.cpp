@@ -44,7 +44,7 @@ void LinkRefinement::run(const Progress& progress) {
   refine({{0, 0, View::kUnknown}}, progress);
 }
 
-void LinkRefinement::revise(const std::vector<bool>& doubtful, const Progress& progress) {
+std::size_t LinkRefinement::revise(const std::vector<bool>& doubtful, const Progress& progress) {
   const auto nodes = tree_.nodes();
   doubtful_.assign(nodes.size(), 0);
   for (std::size_t k = nodes.size(); k-- > 0;) {
@@ -60,7 +60,9 @@ void LinkRefinement::revise(const std::vector<bool>& doubtful, const Progress& p
              (tree_[0].area * tree_[0].area);
     return true;
   });
+  const std::size_t kept = links_.size();
   refine(std::move(again), progress);
+  return kept;
 }
 
 void LinkRefinement::refine(std::vector<Candidate> generation, const Progress& progress) {
@@ -99,32 +101,24 @@ LinkRefinement::Outcome LinkRefinement::decide(const Candidate& pair, Scratch& s
     return is_plane(a) ? Outcome{} : split(pair, View::kUnknown);
   if (pair.a == pair.b && shadow_rays_.geometry().bounds(tree_.leaf_patch(a)).is_flat()) return {};
   if (pair.a != pair.b && cannot_exchange(a, b)) return {};
-  if (a.is_leaf() && b.is_leaf()) return link_patches(pair, scratch);
+  if (a.is_leaf() && b.is_leaf()) return link_patches(pair);
   if (!scratch.kernel.estimate(pair.a, pair.b)) return split(pair, pair.view);
   return link_nodes(pair, scratch);
 }
 
-LinkRefinement::Outcome LinkRefinement::link_patches(const Candidate& pair,
-                                                     Scratch& scratch) const {
+LinkRefinement::Outcome LinkRefinement::link_patches(const Candidate& pair) const {
   const std::uint32_t i = tree_.leaf_patch(tree_[pair.a]), j = tree_.leaf_patch(tree_[pair.b]);
-  const double unoccluded = shadow_rays_.unoccluded(std::min(i, j), std::max(i, j));
-  if (unoccluded <= 0) return {};
-  LinkRays::Visibility visible{.mixed = true};
-  if (!needs_all_rays(pair)) {
-    visible = rays_.trace(pair.a, pair.b, settings_.probe_rays, scratch.rays);
-    scratch.ray_count += settings_.probe_rays;
-  }
-  if (visible.mixed) {
-    visible = rays_.trace(pair.a, pair.b, settings_.full_rays, scratch.rays);
-    scratch.ray_count += settings_.full_rays;
-  }
+  const PatchGeometry& geometry = shadow_rays_.geometry();
+  const double most = is_coarse_pair(geometry, i, j)
+                          ? std::min(geometry.area(i), geometry.area(j))
+                          : shadow_rays_.unoccluded(std::min(i, j), std::max(i, j));
+  if (most <= 0) return {};
   return {.kind = Outcome::Kind::kLink,
           .view = View::kUnknown,
           .link = {.a = pair.a,
                    .b = pair.b,
-                   .exchange_area = static_cast<float>(visible.part * unoccluded),
-                   .unoccluded_area = static_cast<float>(unoccluded),
-                   .visibility_variance = static_cast<float>(visible.variance),
+                   .exchange_area = 0,
+                   .unoccluded_area = static_cast<float>(most),
                    .gradient_a = {},
                    .gradient_b = {}}};
 }
@@ -188,7 +182,6 @@ LinkRefinement::Outcome LinkRefinement::make_link(const Candidate& pair, const P
                    .b = pair.b,
                    .exchange_area = static_cast<float>(visible.part * kernel.unoccluded()),
                    .unoccluded_area = static_cast<float>(kernel.unoccluded()),
-                   .visibility_variance = static_cast<float>(visible.variance),
                    .gradient_a = to_float3(visible.part * kernel.gradient_a()),
                    .gradient_b = to_float3(visible.part * kernel.gradient_b())}};
 }

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "precompute/base/progress.h"
@@ -21,7 +22,6 @@ struct Link {
   std::uint32_t a, b;
   float exchange_area;            ///< m²
   float unoccluded_area;          ///< m²: the exchange area with nothing between, the upper limit
-  float visibility_variance;      ///< of exchange_area / unoccluded_area
   Float3 gradient_a, gradient_b;  ///< m
 };
 
@@ -37,7 +37,7 @@ struct Link {
 /// visibility. A pair gets more rays the more light it exchanges, so that the light that rays may
 /// miss is below link_epsilon too; pairs without any visible light end there. Parts of a pair whose
 /// rays disagree get all rays, because few rays mostly miss the little light that passes a door.
-/// Pairs of patches have the same kernel and rays as in raw_exchange.h.
+/// Links between two patches are left to be measured (leaf_links.h).
 ///
 /// Pairs are refined in generations. OpenMP threads share each generation; the bits do not depend
 /// on their number. Throws Cancelled if `progress` asks to stop.
@@ -51,12 +51,14 @@ class LinkRefinement {
   void run(const Progress& progress);
 
   /// Examines every link of a patch that is `doubtful` [n] again, with all rays. Where the rays
-  /// disagree, the link is split down to that patch.
-  void revise(const std::vector<bool>& doubtful, const Progress& progress);
+  /// disagree, the link is split down to that patch. The links from the returned number on are new.
+  std::size_t revise(const std::vector<bool>& doubtful, const Progress& progress);
 
   /// Every pair of patches that can exchange light is in at most one link. Links with an exchange
   /// area of 0 are pairs that are hidden from each other.
   std::span<const Link> links() const { return links_; }
+  std::span<Link> links() { return links_; }
+  std::vector<Link> take_links() { return std::move(links_); }
   /// Pairs of nodes that were examined.
   std::uint64_t candidate_count() const { return candidate_count_; }
   std::uint64_t ray_count() const { return ray_count_; }
@@ -80,7 +82,7 @@ class LinkRefinement {
   void decide(const std::vector<Candidate>& generation, std::vector<Outcome>& outcomes,
               const Progress& progress);
   Outcome decide(const Candidate& pair, Scratch& scratch) const;
-  Outcome link_patches(const Candidate& pair, Scratch& scratch) const;
+  Outcome link_patches(const Candidate& pair) const;
   Outcome link_nodes(const Candidate& pair, Scratch& scratch) const;
   Outcome link_mixed(const Candidate& pair, const PairKernel& kernel,
                      const LinkRays::Visibility& visible) const;

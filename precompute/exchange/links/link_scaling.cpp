@@ -12,6 +12,10 @@ constexpr int kScalingSteps = 30;  // each step about halves the rest
 constexpr double kScaled = 1e-6;   // a row sum this near to its target is scaled
 constexpr double kLeastFactor = 0.5, kGreatestFactor = 2;
 
+// The same where links between patches with nothing between them stay. Where more than that would
+// be needed, as in nooks, these are what is off.
+constexpr double kLeastOfRest = 0.9, kGreatestOfRest = 1.1;
+
 // Least factor of patches that see almost nothing: their exchange has leaked through nodes on both
 // sides of a wall and may be removed.
 constexpr double kLeastFactorUnseeing = 1e-6;
@@ -26,9 +30,20 @@ struct Moments {
   glm::dvec3 first{0};
 };
 
-double least_factor(const RowSumTarget& target) {
-  return target.sum <= 3 * target.deviation ? kLeastFactorUnseeing : kLeastFactor;
+bool sees_almost_nothing(const RowSumTarget& target) {
+  return target.sum <= 3 * target.deviation;
 }
+
+/// Limits of the factor of a patch.
+struct Limits {
+  double least, greatest, least_unseeing;
+
+  double clamp(double factor, const RowSumTarget& target) const {
+    return std::clamp(factor, sees_almost_nothing(target) ? least_unseeing : least, greatest);
+  }
+};
+constexpr Limits kOfRest{kLeastOfRest, kGreatestOfRest, kLeastOfRest},
+    kOfAll{kLeastFactor, kGreatestFactor, kLeastFactorUnseeing};
 
 /// The mean of `x` over each node.
 std::vector<Moments> pull(const LinkTree& tree, std::span<const double> x) {
@@ -113,32 +128,66 @@ std::vector<double> scaled_row_sums(const LinkTree& tree, std::span<const Link> 
   return sum;
 }
 
-/// The relative change of the exchange by factors, Frobenius; each link counts as equal for all of
-/// its pairs.
-double relative_change(const LinkTree& tree, std::span<const Link> links,
-                       std::span<const double> factor) {
-  const auto nodes = tree.nodes();
-  std::vector<double> mean(nodes.size(), 0.0);
-  for (std::size_t k = nodes.size(); k-- > 0;) {
-    const LinkNode& node = nodes[k];
-    if (node.is_leaf()) {
-      mean[k] = factor[tree.leaf_patch(node)];
-      continue;
+/// Changes the factors until the rows of `links` add up to `wanted` [n], as far as their limits
+/// allow.
+void scale_to(const LinkTree& tree, std::span<const Link> links, std::span<const double> wanted,
+              std::span<const RowSumTarget> target, const Limits& limits,
+              std::vector<double>& factor) {
+  for (int step = 0; step < kScalingSteps; ++step) {
+    const std::vector<double> row = scaled_row_sums(tree, links, factor);
+    double worst = 0;
+    for (std::size_t i = 0; i < factor.size(); ++i) {
+      if (factor[i] == 0) continue;
+      worst = std::max(worst, std::abs(row[i] - wanted[i]));
+      if (row[i] <= 0 || wanted[i] <= 0) continue;
+      factor[i] = limits.clamp(factor[i] * std::sqrt(wanted[i] / row[i]), target[i]);
     }
-    for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
-      mean[k] += nodes[c].count * mean[c] / node.count;
-    }
+    if (worst < kScaled) break;
   }
-  double change = 0, norm = 0;
-  for (const Link& link : links) {
-    const double pairs = static_cast<double>(nodes[link.a].count) * nodes[link.b].count;
-    const double squared = static_cast<double>(link.exchange_area) * link.exchange_area / pairs;
-    const double part = mean[link.a] * mean[link.b] - 1;
-    change += squared * part * part;
-    norm += squared;
-  }
-  return norm > 0 ? std::sqrt(change / norm) : 0;
 }
+
+/// True for two patches with nothing between them.
+bool is_certain(const LinkTree& tree, const Link& link) {
+  return tree[link.a].is_leaf() && tree[link.b].is_leaf() &&
+         link.exchange_area == link.unoccluded_area;
+}
+
+/// Divides links between patches by their factors, except where these are 0.
+void divide(const LinkTree& tree, std::span<const double> factor, std::span<Link> links) {
+  const auto of = [&](std::uint32_t leaf) {
+    const double f = factor[tree.leaf_patch(tree[leaf])];
+    return f > 0 ? f : 1;
+  };
+  for (Link& link : links) link.exchange_area /= static_cast<float>(of(link.a) * of(link.b));
+}
+
+/// The squared change of the exchange by factors, and its squared norm, Frobenius.
+struct Change {
+  double change = 0, norm = 0;
+
+  /// Each link counts as equal for all of its pairs.
+  void add(const LinkTree& tree, std::span<const Link> links, std::span<const double> factor) {
+    const auto nodes = tree.nodes();
+    std::vector<double> mean(nodes.size(), 0.0);
+    for (std::size_t k = nodes.size(); k-- > 0;) {
+      const LinkNode& node = nodes[k];
+      if (node.is_leaf()) {
+        mean[k] = factor[tree.leaf_patch(node)];
+        continue;
+      }
+      for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
+        mean[k] += nodes[c].count * mean[c] / node.count;
+      }
+    }
+    for (const Link& link : links) {
+      const double pairs = static_cast<double>(nodes[link.a].count) * nodes[link.b].count;
+      const double squared = static_cast<double>(link.exchange_area) * link.exchange_area / pairs;
+      const double part = mean[link.a] * mean[link.b] - 1;
+      change += squared * part * part;
+      norm += squared;
+    }
+  }
+};
 
 }  // namespace
 
@@ -147,30 +196,35 @@ std::vector<double> gather_links(const LinkTree& tree, std::span<const Link> lin
   return push(tree, gather_nodes(pull(tree, x), links), x.size());
 }
 
-LinkScaling scale_links(const LinkTree& tree, std::span<const Link> links,
+LinkScaling scale_links(const LinkTree& tree, std::span<Link> links,
                         std::span<const RowSumTarget> target) {
   LinkScaling result;
   std::vector<double>&factor = result.factor, &row = result.row_sum;
+  const auto rest = std::ranges::stable_partition(
+      links, [&](const Link& link) { return is_certain(tree, link); });
+  const std::span certain = links.first(links.size() - rest.size());
   row = gather_links(tree, links, std::vector<double>(target.size(), 1.0));
   result.closure.row_sum_error_before = largest_row_error(row, target, /*certain=*/false);
   factor = first_factors(target);
-  row = scaled_row_sums(tree, links, factor);
-  const std::vector<double> wanted = wanted_sums(row, target);
-  for (int step = 0; step < kScalingSteps; ++step) {
-    double worst = 0;
-    for (std::size_t i = 0; i < factor.size(); ++i) {
-      if (factor[i] == 0) continue;
-      worst = std::max(worst, std::abs(row[i] - wanted[i]));
-      if (row[i] <= 0 || wanted[i] <= 0) continue;
-      factor[i] = std::clamp(factor[i] * std::sqrt(wanted[i] / row[i]), least_factor(target[i]),
-                             kGreatestFactor);
-    }
-    if (worst < kScaled) break;
-    row = scaled_row_sums(tree, links, factor);
-  }
+  const std::vector<double> wanted = wanted_sums(scaled_row_sums(tree, links, factor), target);
+
+  std::vector<double> of_rest = wanted;
+  const std::vector<double> held = scaled_row_sums(tree, certain, factor);
+  for (std::size_t i = 0; i < held.size(); ++i) of_rest[i] -= held[i];
+  scale_to(tree, rest, of_rest, target, kOfRest, factor);
+  divide(tree, factor, certain);
+  std::vector<double> change = factor;
+  scale_to(tree, links, wanted, target, kOfAll, factor);
   row = scaled_row_sums(tree, links, factor);
   result.closure.row_sum_error_after = largest_row_error(row, target, /*certain=*/true);
-  result.closure.relative_change = relative_change(tree, links, factor);
+
+  Change squared;
+  squared.add(tree, rest, factor);
+  for (std::size_t i = 0; i < change.size(); ++i) {
+    if (change[i] > 0) change[i] = factor[i] / change[i];
+  }
+  squared.add(tree, certain, change);
+  if (squared.norm > 0) result.closure.relative_change = std::sqrt(squared.change / squared.norm);
   return result;
 }
 

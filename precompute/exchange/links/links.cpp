@@ -51,13 +51,13 @@ LinkBuild build_links(const PatchModel& model, const RayTracer& tracer,
   RefinedLinks refined = refine_links(model, shadow_rays, tracer, settings, weight, progress);
   round_gradients(refined.links);
   LinkBuild build;
+  const LinkScaling scaling = scale_links(refined.tree, refined.links, refined.target);
   copy_tree(refined.tree, build.links);
   copy_links(refined.links, build.links);
-  const LinkScaling scaling = scale_links(refined.tree, refined.links, refined.target);
   build.links.scale.assign(scaling.factor.begin(), scaling.factor.end());
   build.closure = scaling.closure;
   static_cast<EscapedLight&>(build) = share_escape(scaling.row_sum, refined.escape);
-  build.ray_count = refined.ray_count + model.patches.size() * settings.hemisphere_rays;
+  build.ray_count = refined.ray_count;
   build.candidate_count = refined.candidate_count;
   return build;
 }

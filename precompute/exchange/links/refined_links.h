@@ -20,13 +20,13 @@ struct RefinedLinks {
   std::vector<Link> links;
   std::vector<Escape> escape;        ///< [n]
   std::vector<RowSumTarget> target;  ///< [n]
-  std::uint64_t ray_count = 0;       ///< without the rays that measure what escapes
+  std::uint64_t ray_count = 0;
   std::uint64_t candidate_count = 0;
 };
 
-/// Refines links to settings.link_epsilon, measures what escapes, and revises the links of patches
-/// whose row sum disagrees with it. `weight` is that of LinkTree. Throws Cancelled if asked to
-/// stop.
+/// Refines links to settings.link_epsilon, measures what escapes and those between single patches,
+/// and revises the links of patches whose row sum disagrees. `weight` is that of LinkTree. Throws
+/// Cancelled if asked to stop.
 RefinedLinks refine_links(const PatchModel& model, const ShadowRays& shadow_rays,
                           const RayTracer& tracer, const FormFactorSettings& settings,
                           std::span<const float> weight, const Progress& progress);

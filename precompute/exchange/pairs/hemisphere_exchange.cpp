@@ -32,11 +32,9 @@ std::vector<MetPatch> MetPatchCounter::count(std::size_t patch_count,
   return met;
 }
 
-/// Combines the counts of both sides, n_i of N from area A_i and n_j of N from A_j, weighted by the
-/// inverse of their variances: (n_i + n_j) A_i A_j / ((A_i + A_j) N), whatever the exchange.
 HemisphereExchange::HemisphereExchange(const std::vector<std::vector<MetPatch>>& met,
                                        std::span<const double> area, int ray_count)
-    : area_(area.begin(), area.end()), ray_count_(ray_count), pairs_(met.size()) {
+    : CountedExchange(area, ray_count), pairs_(met.size()) {
   // Lists by the other patch, in its order, so that each list below comes out in order.
   std::vector<std::vector<MetPatch>> met_by(met.size());
   for (std::uint32_t k = 0; k < met.size(); ++k) {
@@ -56,14 +54,14 @@ HemisphereExchange::HemisphereExchange(const std::vector<std::vector<MetPatch>>&
       // Rays of a patch to itself count for both sides.
       const std::uint32_t count =
           (take_own ? (j == i ? 2 : 1) * own->count : 0) + (take_other ? other->count : 0);
-      pairs_[i].push_back({j, count, count * area_per_ray(i, j)});
+      pairs_[i].push_back({j, count, exchange(i, j, count)});
       if (take_own) ++own;
       if (take_other) ++other;
     }
   }
 }
 
-double HemisphereExchange::area_per_ray(std::uint32_t i, std::uint32_t j) const {
+double CountedExchange::area_per_ray(std::uint32_t i, std::uint32_t j) const {
   return area_[i] * area_[j] / ((area_[i] + area_[j]) * ray_count_);
 }
 
@@ -73,12 +71,12 @@ HemisphereExchange::Pair HemisphereExchange::find(std::uint32_t i, std::uint32_t
   return {j, 0, 0};
 }
 
-double HemisphereExchange::variance(std::uint32_t i, std::uint32_t j, double truth) const {
+double CountedExchange::variance(std::uint32_t i, std::uint32_t j, double truth) const {
   const double unit = area_per_ray(i, j);
   return unit * unit * variance_of_count(truth / unit + 1);
 }
 
-double HemisphereExchange::expected_count(std::uint32_t i, std::uint32_t j, double exchange) const {
+double CountedExchange::expected_count(std::uint32_t i, std::uint32_t j, double exchange) const {
   return exchange / area_per_ray(i, j);
 }
 

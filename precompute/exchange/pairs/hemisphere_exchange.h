@@ -25,10 +25,38 @@ class MetPatchCounter {
   std::vector<std::uint32_t> met_;    ///< patches whose count is not 0
 };
 
-/// The exchange of pairs of patches estimated from hemisphere rays: a Monte Carlo estimate without
-/// bias that includes visibility and the shape of the patches, and whose rows add up. It is coarse
-/// for far and small patches and good for near ones, where kernels times visibility are worst.
-class HemisphereExchange {
+/// What the number of hemisphere rays between two patches, counted from both sides, tells of their
+/// exchange: a Monte Carlo estimate without bias that includes visibility and the shape of the
+/// patches. It is coarse for far and small patches and good for near ones, where kernels times
+/// visibility are worst.
+class CountedExchange {
+ public:
+  /// `area` [n] in m²; `ray_count` cosine-distributed rays leave each patch.
+  CountedExchange(std::span<const double> area, int ray_count)
+      : area_(area.begin(), area.end()), ray_count_(ray_count) {}
+
+  /// The exchange in m² that `count` rays from either side tell of. Both sides are weighted by the
+  /// inverse of their variances: n_i of N rays from area A_i and n_j of N from A_j give
+  /// (n_i + n_j) A_i A_j / ((A_i + A_j) N), whatever the exchange.
+  double exchange(std::uint32_t i, std::uint32_t j, std::uint32_t count) const {
+    return count * area_per_ray(i, j);
+  }
+
+  /// Variance of that, m⁴, if the pair really exchanges `truth` m².
+  double variance(std::uint32_t i, std::uint32_t j, double truth) const;
+
+  /// The expected number of rays between the pair if it exchanges `exchange` m².
+  double expected_count(std::uint32_t i, std::uint32_t j, double exchange) const;
+
+ private:
+  double area_per_ray(std::uint32_t i, std::uint32_t j) const;
+
+  std::vector<double> area_;
+  double ray_count_;
+};
+
+/// The exchange of all pairs of patches estimated from hemisphere rays; rows add up.
+class HemisphereExchange : public CountedExchange {
  public:
   /// `met` [n] for each patch, from `ray_count` cosine-distributed rays each; `area` [n] in m².
   HemisphereExchange(const std::vector<std::vector<MetPatch>>& met, std::span<const double> area,
@@ -47,17 +75,7 @@ class HemisphereExchange {
   /// The pair (i, j), i <= j; count and exchange are 0 if no ray connects it.
   Pair find(std::uint32_t i, std::uint32_t j) const;
 
-  /// Variance of the `exchange` of a pair, m⁴, if the pair really exchanges `truth` m².
-  double variance(std::uint32_t i, std::uint32_t j, double truth) const;
-
-  /// The expected number of rays between the pair if it exchanges `exchange` m².
-  double expected_count(std::uint32_t i, std::uint32_t j, double exchange) const;
-
  private:
-  double area_per_ray(std::uint32_t i, std::uint32_t j) const;
-
-  std::vector<double> area_;
-  double ray_count_;
   std::vector<std::vector<Pair>> pairs_;
 };
 

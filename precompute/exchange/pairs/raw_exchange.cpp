@@ -10,27 +10,17 @@
 #include "precompute/base/parallel_progress.h"
 #include "precompute/exchange/pairs/adaptive_row_sampling.h"
 #include "precompute/exchange/pairs/hemisphere_exchange.h"
+#include "precompute/exchange/pairs/pair_exchange.h"
 #include "precompute/exchange/pairs/row_sum_targets.h"
 
 namespace rebounce {
 namespace {
 
-// Deviations by which the count of hemisphere rays must be off before a clear pair is examined
-// again, and before the count overrules all rays of the pair.
-constexpr double kDoubt = 2, kContradiction = 4;
-
-// A large pair exchanges more than this fraction of the light of either patch (lab/011).
-constexpr double kLargePart = 3e-4;
-
-// The variance of points of Sobol's sequence as a fraction of that of random ones; over
-// partly hidden pairs it is 0.14 to 0.19 (lab/004).
-constexpr double kSpreadGain = 0.2;
-
 // A row is traced again with this multiple of the probe rays if its sum is off its target by more
-// than the tolerance (and three deviations), for settings with at least the default number of rays:
-// probe rays miss some partly covered pairs (lab/005).
+// than the tolerance (and three deviations), for settings with at least the default number of rays
+// (lab/005).
 constexpr double kRowSumTolerance = 6e-4;
-constexpr int kDefaultRays = 64, kRefinedProbes = 4;
+constexpr int kDefaultRays = 64;
 
 // A forecast samples one of kForecastShare patches, within these limits, in runs of neighbours,
 // whose rays meet similar surfaces.
@@ -120,9 +110,8 @@ class RawExchangeBuilder {
   using Clock = std::chrono::steady_clock;
 
   struct Scratch {
-    std::vector<FacingPatch> facing, mixed, large_mixed;
-    std::vector<Ray> rays;
-    std::vector<float> transmitted;  ///< by ray
+    std::vector<FacingPatch> facing;
+    PairExchange::Scratch pairs;
     EscapeScratch escape;
     MetPatchCounter counter;
   };
@@ -166,6 +155,7 @@ class RawExchangeBuilder {
         },
         part);
     hemisphere_.emplace(met, geometry_.areas(), settings_.hemisphere_rays);
+    pair_exchange_.emplace(shadow_rays_, tracer_, *hemisphere_, settings_);
     return escape;
   }
 
@@ -179,34 +169,18 @@ class RawExchangeBuilder {
     std::ranges::sort(row, {}, &ExchangeEntry::column);
   }
 
-  /// Adds the pairs (i, j) that are not coarse and have `wanted`(j). Each first gets `probe` rays,
-  /// which show whether it needs more.
+  /// Adds the pairs (i, j) that are not coarse and have `wanted`(j), with `probe` rays at first.
   template <typename Wanted>
-  void append_fine(std::uint32_t i, std::size_t probe, const Wanted& wanted, Scratch& scratch,
+  void append_fine(std::uint32_t i, int probe, const Wanted& wanted, Scratch& scratch,
                    std::vector<ExchangeEntry>& row) {
     shadow_rays_.find_facing(i, scratch.facing, [&](std::uint32_t j) {
       return wanted(j) && !is_coarse_pair(geometry_, i, j);
     });
-    shadow_rays_.make_probe_rays(i, scratch.facing, static_cast<int>(probe), scratch.rays);
-    trace(scratch);
-    scratch.mixed.clear();
-    scratch.large_mixed.clear();
-    for (std::size_t p = 0; p < scratch.facing.size(); ++p) {
-      const FacingPatch& pair = scratch.facing[p];
-      const auto agreement =
-          ShadowRays::agreement(std::span(scratch.rays).subspan(p * probe, probe),
-                                std::span(scratch.transmitted).subspan(p * probe, probe));
-      if (agreement == ShadowRays::Agreement::kMixed ||
-          is_contradicted(i, pair, agreement, kDoubt)) {
-        (is_large_pair(geometry_, i, pair) ? scratch.large_mixed : scratch.mixed).push_back(pair);
-      } else if (agreement == ShadowRays::Agreement::kClear) {
-        append_clear(pair, row);
-      }
-    }
-    append_mixed(i, scratch.mixed, settings_.full_rays, scratch, row);
-    append_mixed(i, scratch.large_mixed, kLargeFactor * settings_.full_rays, scratch, row);
+    for (FacingPatch& pair : scratch.facing) pair.count = hemisphere_->find(i, pair.patch).count;
+    scratch.pairs.ray_count = 0;
+    pair_exchange_->measure(i, scratch.facing, probe, scratch.pairs, row);
     pair_count_ += scratch.facing.size();
-    ray_count_ += scratch.facing.size() * probe;
+    ray_count_ += scratch.pairs.ray_count;
   }
 
   /// With fewer rays than the default, rows are noisy, and more rays for some of them would only
@@ -214,18 +188,6 @@ class RawExchangeBuilder {
   double row_sum_tolerance() const {
     return kRowSumTolerance *
            std::max(1.0, static_cast<double>(kDefaultRays) / settings_.full_rays);
-  }
-
-  /// True if the hemisphere rays contradict the agreeing rays of a pair: by this number of
-  /// `deviations` if the pair counts as clear.
-  bool is_contradicted(std::uint32_t i, const FacingPatch& pair, ShadowRays::Agreement agreement,
-                       double deviations) const {
-    const double count = hemisphere_->find(i, pair.patch).count;
-    if (agreement == ShadowRays::Agreement::kHidden) return count > 0;
-    const double expected = hemisphere_->expected_count(i, pair.patch, pair.unoccluded);
-    // The deviation is that of random rays. It is larger than that of these rays, because among
-    // many thousand pairs no pair with an exact kernel may be lost to chance.
-    return std::abs(count - expected) > deviations * std::sqrt(expected + 1);
   }
 
   /// Traces more probe rays for the fine pairs of row i that have a doubtful patch, and replaces
@@ -236,84 +198,16 @@ class RawExchangeBuilder {
     std::erase_if(row, [&](const ExchangeEntry& entry) {
       return is_doubtful(entry.column) && !is_coarse_pair(geometry_, i, entry.column);
     });
-    append_fine(i, static_cast<std::size_t>(kRefinedProbes) * settings_.probe_rays, is_doubtful,
-                scratch, row);
+    append_fine(i, kRefinedProbes * settings_.probe_rays, is_doubtful, scratch, row);
     std::ranges::sort(row, {}, &ExchangeEntry::column);
-  }
-
-  /// Traces `full` rays for each of `pairs` and adds the mean of shadow rays and hemisphere rays,
-  /// weighted by the inverse of their variances, to row i.
-  void append_mixed(std::uint32_t i, const std::vector<FacingPatch>& pairs, int full,
-                    Scratch& scratch, std::vector<ExchangeEntry>& row) {
-    shadow_rays_.make_rays(i, pairs, full, scratch.rays);
-    trace(scratch);
-    for (std::size_t p = 0; p < pairs.size(); ++p) {
-      const FacingPatch& pair = pairs[p];
-      const ShadowRays::Visibility visible =
-          ShadowRays::visibility(std::span(scratch.rays).subspan(p * full, full),
-                                 std::span(scratch.transmitted).subspan(p * full, full));
-      if (visible.part == 1 &&
-          !is_contradicted(i, pair, ShadowRays::Agreement::kClear, kContradiction)) {
-        append_clear(pair, row);
-      } else {
-        append_mean(i, pair, visible, row);
-      }
-    }
-    ray_count_ += pairs.size() * full;
-  }
-
-  /// Adds the mean of `visible` and of the hemisphere rays. Both variances follow from one common
-  /// estimate: with an estimate of its own, each side would count more the less light it finds.
-  void append_mean(std::uint32_t i, const FacingPatch& pair, const ShadowRays::Visibility& visible,
-                   std::vector<ExchangeEntry>& row) const {
-    const double most = pair.unoccluded, shadow = most * visible.part;
-    const double met = hemisphere_->find(i, pair.patch).exchange;
-    const double guess = std::min(most, 0.5 * (shadow + met));
-    const double shadow_variance = most * most * variance_of_part(guess / most, visible);
-    const double met_variance = hemisphere_->variance(i, pair.patch, guess);
-    const double both = shadow_variance + met_variance;
-    append(row, pair, (shadow * met_variance + met * shadow_variance) / both,
-           shadow_variance * met_variance / both);
-  }
-
-  static void append_clear(const FacingPatch& pair, std::vector<ExchangeEntry>& row) {
-    append(row, pair, pair.unoccluded,
-           kVisibilityVarianceFloor * pair.unoccluded * pair.unoccluded);
-  }
-
-  /// The variance of `visible` if `part` of the light passes. Rays that are dimmed, as by glass,
-  /// spread less than rays that either pass or are stopped.
-  static double variance_of_part(double part, const ShadowRays::Visibility& visible) {
-    const double binary = visible.part * (1 - visible.part), rays = visible.ray_count;
-    const double spread = binary > 0 ? visible.variance * rays / binary : 1;
-    // No fraction is known better than this number of rays tells (rule of succession).
-    const double expected = (part * rays + 1) / (rays + 2), least = 1 / (rays + 2);
-    return kSpreadGain * std::max(spread * expected * (1 - expected) / (rays + 1), least * least);
   }
 
   /// Adds the near pairs of many triangles to row i, from hemisphere rays.
   void append_coarse(std::uint32_t i, std::vector<ExchangeEntry>& row) const {
     for (const HemisphereExchange::Pair& pair : hemisphere_->pairs(i)) {
       if (!is_coarse_pair(geometry_, i, pair.patch)) continue;
-      append(row, {pair.patch, pair.exchange}, pair.exchange,
-             hemisphere_->variance(i, pair.patch, pair.exchange));
+      pair_exchange_->count_coarse(i, pair.patch, pair.count, row);
     }
-  }
-
-  /// Traces the rays of the pairs of a patch. Where a surface has holes, the mean of a triangle is
-  /// all that patches resolve; using it keeps the noise of single holes out of F.
-  void trace(Scratch& scratch) const {
-    scratch.transmitted.resize(scratch.rays.size());
-    tracer_.transmittance(scratch.rays, PassageDetail::kTriangle, scratch.transmitted);
-  }
-
-  /// Adds a pair with this `exchange`, m², and variance, m⁴.
-  static void append(std::vector<ExchangeEntry>& row, const FacingPatch& pair, double exchange,
-                     double variance) {
-    if (static_cast<float>(exchange) <= 0) return;
-    const double most = pair.unoccluded;
-    row.push_back({pair.patch, static_cast<float>(exchange), static_cast<float>(most),
-                   static_cast<float>(variance / (most * most))});
   }
 
   const PatchModel& model_;
@@ -324,14 +218,11 @@ class RawExchangeBuilder {
   const PatchGeometry& geometry_;
   const ShadowRays& shadow_rays_;
   std::optional<HemisphereExchange> hemisphere_;
+  std::optional<PairExchange> pair_exchange_;
   std::atomic<std::uint64_t> ray_count_ = 0, pair_count_ = 0;
 };
 
 }  // namespace
-
-bool is_large_pair(const PatchGeometry& geometry, std::uint32_t i, const FacingPatch& pair) {
-  return pair.unoccluded > kLargePart * std::min(geometry.area(i), geometry.area(pair.patch));
-}
 
 RawExchange compute_raw_exchange(const PatchModel& model, const ShadowRays& shadow_rays,
                                  const RayTracer& tracer, const FormFactorSettings& settings,

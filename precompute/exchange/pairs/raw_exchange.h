@@ -12,10 +12,6 @@
 
 namespace rebounce {
 
-/// A pair whose rays all agree may still be partly hidden: its variance is this fraction of the
-/// squared exchange instead of zero.
-inline constexpr double kVisibilityVarianceFloor = 1e-6;
-
 /// The exchange of all pairs of patches from rays and kernels, before closure.
 struct RawExchange {
   ExchangeRows rows;
@@ -25,19 +21,10 @@ struct RawExchange {
   std::uint64_t pair_count = 0;  ///< pairs that face each other and got shadow rays
 };
 
-/// True for a pair of patch i that exchanges much light. If it is partly hidden, it gets
-/// kLargeFactor times the rays of other pairs: what its rays miss shows in row sums, and its noise
-/// in the ranks of blocks.
-bool is_large_pair(const PatchGeometry& geometry, std::uint32_t i, const FacingPatch& pair);
-inline constexpr int kLargeFactor = 6;  // lab/011: fewer raise the rank of far blocks
-
 /// Computes the exchange of every pair of patches:
 ///
 /// - 1. Hemisphere rays of every patch measure what escapes and which patches see each other.
-/// - 2. A pair with a good kernel gets a few shadow rays. If they agree with each other and with
-///   the hemisphere rays, that is the answer. Otherwise it gets all of its rays, more if it
-///   exchanges much. If those do not agree either, the answer is the mean of shadow rays and
-///   hemisphere rays, weighted by the inverse of their variances.
+/// - 2. A pair with a good kernel is measured by shadow rays too (pair_exchange.h).
 /// - 3. A near pair of many triangles uses the hemisphere rays alone.
 /// - 4. Rows whose sum is off its target get more probe rays for every pair
 ///   (adaptive_row_sampling.h).

@@ -17,7 +17,8 @@ namespace rebounce {
 /// The other patch of a pair that exchanges light.
 struct FacingPatch {
   std::uint32_t patch;
-  double unoccluded;  ///< exchange area in m² with nothing between
+  double unoccluded;        ///< exchange area in m² with nothing between
+  std::uint32_t count = 0;  ///< hemisphere rays between the two, from either side
 };
 
 /// An estimate, from weighted rays, of the fraction of light that passes.

@@ -42,8 +42,9 @@ struct FormFactorSettings {
   double link_epsilon = 0;
 };
 
-/// Error that a link may have by default: notes/concepts/links.md.
-inline constexpr double kLinkEpsilon = 5e-4;  // lab/013
+/// Error that a link may have at the default tolerance, in proportion to which it grows:
+/// notes/concepts/links.md.
+inline constexpr double kLinkEpsilon = 1.5e-4;  // lab/117
 
 /// How exact form factors are, and how long they take.
 enum class FormFactorQuality : std::uint8_t {
@@ -120,7 +121,8 @@ struct BuildSettings {
   SubdivisionSettings subdivision;
   FormFactorSettings form_factors;
   /// kPairs: link_epsilon is 0.
-  /// kLinks: link_epsilon 0 stands for kLinkEpsilon, and the operator is hierarchical or none.
+  /// kLinks: link_epsilon 0 stands for kLinkEpsilon, times the tolerance over the default one, and
+  /// the operator is hierarchical or none.
   ExchangeSource exchange_source = ExchangeSource::kAutomatic;
   /// Store links too, for hierarchical radiosity: fitted to the form factors of all pairs, or to
   /// the links that were found instead.

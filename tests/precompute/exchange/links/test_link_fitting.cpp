@@ -90,7 +90,7 @@ TEST(LinkFitting, WorthNextToNothingLinksAreThePairs) {
 
 TEST(LinkFitting, FewerAndTruerThanByRays) {
   const Pairs& pairs = furnished();
-  const FormFactorLinks by_rays = traced(pairs), links = fitted(pairs, 2.5 * kErrorPerLink);
+  const FormFactorLinks by_rays = traced(pairs), links = fitted(pairs, 1.25 * kErrorPerLink);
   const double error_by_rays = error_of(pairs, by_rays), error = error_of(pairs, links);
   std::printf("links, error of F times light: %zu, %.4f by rays; %zu, %.4f fitted\n",
               by_rays.pair.size(), error_by_rays, links.pair.size(), error);
