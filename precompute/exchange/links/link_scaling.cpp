@@ -200,9 +200,10 @@ LinkScaling scale_links(const LinkTree& tree, std::span<Link> links,
                         std::span<const RowSumTarget> target) {
   LinkScaling result;
   std::vector<double>&factor = result.factor, &row = result.row_sum;
-  const auto rest = std::ranges::stable_partition(
-      links, [&](const Link& link) { return is_certain(tree, link); });
-  const std::span certain = links.first(links.size() - rest.size());
+  const auto middle = std::stable_partition(
+      links.begin(), links.end(), [&](const Link& link) { return is_certain(tree, link); });
+  const auto certain_count = static_cast<std::size_t>(middle - links.begin());
+  const std::span certain = links.first(certain_count), rest = links.subspan(certain_count);
   row = gather_links(tree, links, std::vector<double>(target.size(), 1.0));
   result.closure.row_sum_error_before = largest_row_error(row, target, /*certain=*/false);
   factor = first_factors(target);
