@@ -9,6 +9,7 @@
 #include "precompute/build/build_decisions.h"
 #include "precompute/build/build_estimate.h"
 #include "precompute/build/exchange_stage.h"
+#include "precompute/build/link_stage.h"
 #include "precompute/build/operator_stage.h"
 #include "precompute/build/output_stage.h"
 #include "precompute/build/phase_clock.h"
@@ -103,9 +104,12 @@ class TransferBuild {
   void find_exchange() {
     if (!tracer_) tracer_.emplace(make_surface_tracer(model_.mesh));
     const bool links = decided_.exchange_source == ExchangeSource::kLinks;
-    const auto find = links ? find_links : find_pairs;
-    EscapedLight escaped = find(model_, *tracer_, decided_, data_, report_, clock_);
-    if (links && decided_.operator_kind != OperatorKind::kNoOperator) {
+    const bool operator_of_links = links && decided_.operator_kind != OperatorKind::kNoOperator;
+    const bool judged = operator_of_links && settings_.form_factors.link_epsilon == 0;
+    EscapedLight escaped =
+        links ? find_links(model_, *tracer_, roles_, judged, decided_, data_, report_, clock_)
+              : find_pairs(model_, *tracer_, decided_, data_, report_, clock_);
+    if (operator_of_links) {
       LinkedBuild build =
           linked_build(built_scene(model_.patches.size(), model_.mesh), report_.link_count,
                        model_.patches.reflectance, roles_, kCompressionPart * decided_.tolerance);

@@ -106,6 +106,7 @@ std::string report_json(const BuildReport& report, const std::vector<KindError>&
 void record_build(const BuildSettings& decided, const BuildReport& report,
                   const std::vector<KindError>& errors, TransferData& data) {
   BuildRecord& record = data.record;
+  record.error_bound = 0;
   for (const KindError& e : errors) {
     record.error_bound = std::max(record.error_bound, e.bound);
     if (e.kind != LightKind::kPoint) continue;

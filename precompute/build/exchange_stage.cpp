@@ -3,7 +3,6 @@
 #include <utility>
 
 #include "precompute/exchange/links/link_fitting.h"
-#include "precompute/exchange/links/links.h"
 #include "precompute/exchange/pairs/form_factors.h"
 
 namespace rebounce {
@@ -26,20 +25,6 @@ EscapedLight find_pairs(const PatchModel& model, const RayTracer& tracer,
   }
   data.exchange = std::move(form_factors.exchange);
   return form_factors;
-}
-
-EscapedLight find_links(const PatchModel& model, const RayTracer& tracer,
-                        const BuildSettings& decided, TransferData& data, BuildReport& report,
-                        PhaseClock& clock) {
-  LinkBuild build = clock.run("form factors", [&](const Progress& part) {
-    return build_links(model, tracer, decided.form_factors, {}, part);
-  });
-  report.ray_count = build.ray_count;
-  report.pair_count = build.candidate_count;
-  report.link_count = build.links.pair.size();
-  report.closure = build.closure;
-  data.links = std::move(build.links);
-  return build;
 }
 
 }  // namespace rebounce

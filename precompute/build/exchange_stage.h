@@ -10,16 +10,10 @@
 
 namespace rebounce {
 
-// What patches exchange: found, and recorded in `report`. `decided`: settings that leave nothing
-// open. Both return what leaves the scene, and throw Cancelled if asked to stop.
-
-/// Into data.exchange, and into data.links if they are to be stored.
+/// Finds what patches exchange as pairs, into data.exchange, and into data.links if these are to be
+/// stored, and records it in `report`. `decided`: settings that leave nothing open. Returns what
+/// leaves the scene. Throws Cancelled if asked to stop.
 EscapedLight find_pairs(const PatchModel& model, const RayTracer& tracer,
-                        const BuildSettings& decided, TransferData& data, BuildReport& report,
-                        PhaseClock& clock);
-
-/// Into data.links alone.
-EscapedLight find_links(const PatchModel& model, const RayTracer& tracer,
                         const BuildSettings& decided, TransferData& data, BuildReport& report,
                         PhaseClock& clock);
 

@@ -1,9 +1,11 @@
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "precompute/build/build_estimate.h"
 #include "precompute/build/build_record.h"
+#include "precompute/build/kept_tolerances.h"
 #include "precompute/build/operator_stage.h"
 #include "precompute/compression/form_factor_compression.h"
 #include "precompute/compression/matrix_free_transfer.h"
@@ -110,65 +112,135 @@ double form_factor_tolerance(const BuildSettings& decided, const FittedLights& l
   return std::max(kLeastTolerance, decided.tolerance / kToleranceOverFormFactors * part);
 }
 
+/// What the stages of an operator from links share.
+class LinkedOperator {
+ public:
+  LinkedOperator(const RayTracer& tracer, const BuildSettings& decided, const PatchRoles& roles,
+                 TransferData& data, BuildReport& report, PhaseClock& clock)
+      : tracer_(tracer),
+        decided_(decided),
+        roles_(roles),
+        data_(data),
+        report_(report),
+        clock_(clock),
+        links_(std::make_shared<const LinkedFormFactors>(data.links, data.patches.area,
+                                                         data.patches.centroid)),
+        reference_(links_, data.patches) {}
+
+  void make(std::span<const std::uint32_t> shown_patch) {
+    FormFactorLinks fewer = clock_.run("fewer links", [&](const Progress& part) {
+      return fit_links(data_.links, data_.patches, kErrorPerLink, part);
+    });
+    find_fitting_lights(fewer);
+    compress_form_factors_of();
+    make_operator();
+    check(decided_.form_factors.seed);
+    const double finer = finer_tolerance(data_.record);
+    if (finer > 0) make_again(finer);
+    columns_.reset();
+    report_.whole_error = clock_.run("check by rays", [&](const Progress& part) {
+      return whole_->estimate(shown_patch, tracer_, reference_.preconditioned(data_.transfer),
+                              part);
+    });
+    // The check is the last step that needs all of them.
+    data_.links = decided_.store_links ? std::move(fewer) : FormFactorLinks{};
+    if (decided_.store_links) report_.link_count = data_.links.pair.size();
+    record_build(decided_, report_, errors_, data_);
+  }
+
+ private:
+  double tolerance() const { return kCompressionPart * decided_.tolerance; }
+
+  void find_fitting_lights(const FormFactorLinks& fewer) {
+    lights_ = clock_.run("fitting lights", [&](const Progress& part) {
+      // The third digit of the radiosities does not matter here.
+      const ReferenceSolver solver(std::make_shared<const LinkedFormFactors>(
+                                       fewer, data_.patches.area, data_.patches.centroid),
+                                   data_.patches);
+      return find_lights(tracer_, data_, roles_, decided_.form_factors.seed, solver, part);
+    });
+    report_.form_factor_tolerance =
+        form_factor_tolerance(decided_, lights_, roles_, data_.patches.area);
+  }
+
+  void compress_form_factors_of() {
+    data_.compressed_form_factors =
+        clock_.run("form factor compression", [&](const Progress& part) {
+          return compress_form_factors(data_.links, links_, data_.patches,
+                                       lights_.radiosities.view(),
+                                       {report_.form_factor_tolerance, Precision::kF16}, part);
+        });
+  }
+
+  void make_operator() {
+    const LinkedBuild build{.scene = built_scene(data_.patches.size(), data_.mesh),
+                            .link_count = data_.links.pair.size(),
+                            .matrix_count = distinct_channels(data_.patches.reflectance),
+                            .roles = roles_,
+                            .tolerance = tolerance()};
+    MatrixFreeTransferSettings settings;
+    settings.compression = {tolerance(), *decided_.precision};
+    settings.roles = roles_;
+    settings.memory_limit_bytes =
+        memory_of_matrix_free_transfer(build, decided_.memory_limit_bytes);
+    settings.checkpoint = decided_.checkpoint;
+    data_.transfer = clock_.run("operator", [&](const Progress& part) {
+      const FittingLights lights = lights_.exitances.view();
+      columns_.emplace(*data_.compressed_form_factors, data_.patches, lights, settings, part);
+      return columns_->compress(lights, tolerance(), part_of(part, columns_->solving_part(), 1));
+    });
+    report_.form_factor_error = form_factor_error(*data_.compressed_form_factors, *links_,
+                                                  data_.patches, lights_.test_radiosities);
+    lights_ = {};  // what follows takes their memory
+  }
+
+  /// Measures the error of the operator under lights of this `seed`.
+  void check(std::uint64_t seed) {
+    const ReferenceSolver solver = reference_.preconditioned(data_.transfer);
+    whole_.emplace(data_, roles_, decided_.form_factors.seed,
+                   WholeErrorEstimator::sample_for(data_.patches.size()));
+    errors_ = clock_.run("check", [&](const Progress& part) {
+      if (roles_.all_are_both()) {
+        data_.record.solve_residual = transfer_residual(*data_.transfer, *links_, data_.patches);
+      }
+      return measure_error(data_, tracer_, solver, decided_.tolerance, seed, part,
+                           [&](const auto&... light) { whole_->add(light...); });
+    });
+    record_build(decided_, report_, errors_, data_);
+  }
+
+  /// Makes the operator again from the columns that are there, for a smaller tolerance of the
+  /// light, and checks it under lights that the first check has not seen.
+  void make_again(double finer) {
+    whole_.reset();
+    data_.transfer = clock_.run("operator again", [&](const Progress& part) {
+      const DrawnLights lights =
+          draw_fitting_lights(data_, tracer_, decided_.form_factors.seed, roles_);
+      return columns_->compress(lights.view(), kCompressionPart * finer, part);
+    });
+    check(decided_.form_factors.seed + 1);
+  }
+
+  const RayTracer& tracer_;
+  const BuildSettings& decided_;
+  const PatchRoles& roles_;
+  TransferData& data_;
+  BuildReport& report_;
+  PhaseClock& clock_;
+  std::shared_ptr<const LinkedFormFactors> links_;  ///< from the first light to the last check
+  ReferenceSolver reference_;
+  FittedLights lights_;
+  std::optional<MatrixFreeTransfer> columns_;
+  std::optional<WholeErrorEstimator> whole_;
+  std::vector<KindError> errors_;
+};
+
 }  // namespace
 
 void make_operator_from_links(const RayTracer& tracer, std::span<const std::uint32_t> shown_patch,
                               const BuildSettings& decided, const PatchRoles& roles,
                               TransferData& data, BuildReport& report, PhaseClock& clock) {
-  const PatchTable& patches = data.patches;
-  const std::uint64_t seed = decided.form_factors.seed;
-  const double tolerance = kCompressionPart * decided.tolerance;
-  const LinkedBuild build{.scene = built_scene(patches.size(), data.mesh),
-                          .link_count = data.links.pair.size(),
-                          .matrix_count = distinct_channels(patches.reflectance),
-                          .roles = roles,
-                          .tolerance = tolerance};
-  // Used from the first light to the last check, so it is made once.
-  const auto links =
-      std::make_shared<const LinkedFormFactors>(data.links, patches.area, patches.centroid);
-  const ReferenceSolver reference(links, patches);
-  FormFactorLinks fewer = clock.run("fewer links", [&](const Progress& part) {
-    return fit_links(data.links, patches, kErrorPerLink, part);
-  });
-  FittedLights lights = clock.run("fitting lights", [&](const Progress& part) {
-    // The third digit of the radiosities does not matter here.
-    const ReferenceSolver solver(
-        std::make_shared<const LinkedFormFactors>(fewer, patches.area, patches.centroid), patches);
-    return find_lights(tracer, data, roles, seed, solver, part);
-  });
-  report.form_factor_tolerance = form_factor_tolerance(decided, lights, roles, patches.area);
-  data.compressed_form_factors = clock.run("form factor compression", [&](const Progress& part) {
-    return compress_form_factors(data.links, links, patches, lights.radiosities.view(),
-                                 {report.form_factor_tolerance, Precision::kF16}, part);
-  });
-  data.transfer = clock.run("operator", [&](const Progress& part) {
-    MatrixFreeTransferSettings settings;
-    settings.compression = {tolerance, *decided.precision};
-    settings.roles = roles;
-    settings.memory_limit_bytes = memory_of_matrix_free_transfer(build, decided.memory_limit_bytes);
-    settings.checkpoint = decided.checkpoint;
-    return build_matrix_free_transfer(*data.compressed_form_factors, patches,
-                                      lights.exitances.view(), settings, part);
-  });
-  const ReferenceSolver solver = reference.preconditioned(data.transfer);
-  WholeErrorEstimator whole(data, roles, seed, WholeErrorEstimator::sample_for(patches.size()));
-  const std::vector<KindError> errors = clock.run("check", [&](const Progress& part) {
-    report.form_factor_error =
-        form_factor_error(*data.compressed_form_factors, *links, patches, lights.test_radiosities);
-    if (roles.all_are_both()) {
-      data.record.solve_residual = transfer_residual(*data.transfer, *links, patches);
-    }
-    lights = {};  // what follows takes their memory
-    return measure_error(data, tracer, solver, decided.tolerance, seed, part,
-                         [&](const auto&... light) { whole.add(light...); });
-  });
-  report.whole_error = clock.run("check by rays", [&](const Progress& part) {
-    return whole.estimate(shown_patch, tracer, solver, part);
-  });
-  // The check is the last step that needs all of them.
-  data.links = decided.store_links ? std::move(fewer) : FormFactorLinks{};
-  if (decided.store_links) report.link_count = data.links.pair.size();
-  record_build(decided, report, errors, data);
+  LinkedOperator(tracer, decided, roles, data, report, clock).make(shown_patch);
 }
 
 }  // namespace rebounce

@@ -42,7 +42,8 @@ void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& deci
 
 /// Makes it from data.links, which are kept only on request. F is compressed, and the inverse is
 /// solved for without being stored as a whole (matrix_free_transfer.h). The error is measured
-/// against the links, which neither compression affects. If no tolerance of form factors is set, it
+/// against the links, which neither compression affects; an operator that errs too much under a
+/// single lamp is compressed once more, finer. If no tolerance of form factors is set, it
 /// is reduced by the fraction of the light that receivers get. How far links and operator together
 /// are from exact form factors is estimated by rays; `shown_patch` [t] is that of PatchModel. The
 /// memory limit of `decided` is for what comes on top of what the process held before links.

@@ -13,13 +13,39 @@ namespace rebounce {
 /// Builds Y = F (I - rho F)^-1, compressed, without any matrix of all pairs: the columns of Yhat
 /// are solved for by conjugate gradients, a panel of neighbouring patches at a time, and each panel
 /// is compressed finely as soon as it is there. The operator that this leaves, a few times as large
-/// as the result, is then compressed to the tolerance as build_hierarchical_transfer does.
+/// as the result, is then compressed to the tolerance as build_hierarchical_transfer does, as often
+/// as wanted.
 ///
 /// `form_factors` are a compressed G = A^1/2 F A^-1/2 in f32 or f16 (compress_form_factors). Their
 /// error stays in the result and must be well below the tolerance; the reported error does not
-/// contain it. Throws Error if the least memory is above the limit, if F is not a passive exchange
-/// (I - R G R not positive definite), or if the checkpoint cannot be written; Cancelled if asked to
-/// stop. The bits do not depend on the number of threads, the memory limit or the checkpoint.
+/// contain it. The bits do not depend on the number of threads, the memory limit or the checkpoint.
+class MatrixFreeTransfer {
+ public:
+  /// Solves for the columns. All arguments but the lights must outlive the object. Throws Error if
+  /// the least memory is above the limit, if F is not a passive exchange (I - R G R not positive
+  /// definite), or if the checkpoint cannot be written; Cancelled if asked to stop.
+  MatrixFreeTransfer(const HierarchicalOperator& form_factors, const PatchTable& patches,
+                     const FittingLights& lights, const MatrixFreeTransferSettings& settings,
+                     const Progress& progress = {});
+  ~MatrixFreeTransfer();
+  MatrixFreeTransfer(const MatrixFreeTransfer&) = delete;
+  MatrixFreeTransfer& operator=(const MatrixFreeTransfer&) = delete;
+
+  /// The operator of a `tolerance` that is that of the settings or, at the least, half of it.
+  /// Throws likewise.
+  std::shared_ptr<const HierarchicalOperator> compress(const FittingLights& lights,
+                                                       double tolerance,
+                                                       const Progress& progress = {}) const;
+
+  /// The part of the time that solving for the columns takes, for progress.
+  double solving_part() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// The operator of the tolerance of the settings.
 std::shared_ptr<const HierarchicalOperator> build_matrix_free_transfer(
     const HierarchicalOperator& form_factors, const PatchTable& patches,
     const FittingLights& lights, const MatrixFreeTransferSettings& settings,

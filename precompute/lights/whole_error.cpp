@@ -6,7 +6,7 @@
 
 #include "precompute/base/parallel_progress.h"
 #include "precompute/exchange/pairs/escape.h"
-#include "precompute/exchange/pairs/hemisphere_exchange.h"
+#include "precompute/lights/random_lights.h"
 #include "runtime/rays/patch_points.h"
 #include "runtime/rays/sampling.h"
 #include "transfer/base/area_norm.h"
@@ -29,6 +29,11 @@ constexpr std::size_t kRaysOfGroup = 1 << 23, kMostRays = 4096;
 
 // The lights whose errors are spread together, as many as are solved for together.
 constexpr std::size_t kLightsAtOnce = ReferenceSolver::kBatchLights / kGroups;
+
+// The lights and the part of the rays that decide whether links are near enough, and the residual
+// of these lights, relative to the reflected light: it counts as an error of the links.
+constexpr int kJudgingLights = 32;
+constexpr double kJudgingRays = 0.25, kJudgingResidual = 1e-4;
 
 // Rays take this part of the time of an estimate.
 constexpr double kTracingPart = 0.7;
@@ -130,10 +135,10 @@ WholeErrorEstimator::WholeErrorEstimator(const TransferData& data, const PatchRo
   }
 }
 
-WholeErrorEstimator::Sample WholeErrorEstimator::sample_for(std::size_t patch_count) {
+WholeErrorEstimator::Sample WholeErrorEstimator::sample_for(std::size_t patch_count, double part) {
   Sample sample;
-  const std::size_t rays = kRaysOfGroup / std::min(patch_count, sample.patch_count);
-  sample.ray_count = static_cast<int>(std::min<std::size_t>(rays, kMostRays));
+  const auto patches = static_cast<double>(std::min(patch_count, sample.patch_count));
+  sample.ray_count = static_cast<int>(std::min<double>(part * kRaysOfGroup / patches, kMostRays));
   return sample;
 }
 
@@ -158,40 +163,83 @@ void WholeErrorEstimator::add(std::span<const Float3> initial_exitance,
   }
 }
 
-/// Adds the mean of the radiosity where rays end to what `residual_` holds.
-void WholeErrorEstimator::trace(std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
-                                const Progress& progress) {
+/// The patches that the rays of each patch of a group met.
+WholeErrorEstimator::MetRows WholeErrorEstimator::trace(std::size_t group,
+                                                        std::span<const std::uint32_t> shown_patch,
+                                                        const RayTracer& tracer,
+                                                        const Progress& progress) const {
+  const std::size_t n = data_.patches.size(), rows = patch_[group].size();
+  const PatchTriangles triangles(data_.mesh.triangle_patch, n);
+  MetRows met(rows);
+  ParallelProgress loop(progress, rows);
+#pragma omp parallel
+  {
+    EscapeScratch scratch;
+    MetPatchCounter counter;
+#pragma omp for schedule(dynamic, 16)
+    for (std::size_t k = 0; k < rows; ++k) {
+      if (loop.stopped()) continue;
+      const std::uint32_t i = patch_[group][k];
+      measure_escape(data_.mesh, shown_patch, triangles[i], i, tracer, ray_count_,
+                     mix_bits(seed_ + kGroups + group), scratch);
+      met[k] = counter.count(n, scratch.met);
+      loop.advance();
+    }
+  }
+  loop.finish();
+  return met;
+}
+
+/// What `met` [rows] says from the other side: for each patch of a group, the patches of the group
+/// whose rays met it.
+WholeErrorEstimator::MetRows WholeErrorEstimator::met_by(std::size_t group, const MetRows& met,
+                                                         std::span<const std::uint32_t> row) const {
+  MetRows by(met.size());
+  for (std::size_t k = 0; k < met.size(); ++k) {
+    for (const MetPatch& m : met[k]) {
+      if (row[m.patch] != kNone) by[row[m.patch]].push_back({patch_[group][k], m.count});
+    }
+  }
+  return by;
+}
+
+/// Adds F B to what `residual_` holds of a group. Where both patches of a pair have rays, what
+/// either side says counts by the inverse of its variance, as in CountedExchange: the rays of a
+/// large patch hardly meet a small one.
+void WholeErrorEstimator::add_gathered(std::size_t group, const MetRows& met,
+                                       std::span<const Float3> by_patch) {
+  const std::vector<float>& area = data_.patches.area;
+  const std::size_t lights = residual_[group].front().size();
+  std::vector<std::uint32_t> row(data_.patches.size(), kNone);
+  for (std::uint32_t k = 0; k < met.size(); ++k) row[patch_[group][k]] = k;
+  const MetRows by = met_by(group, met, row);
+#pragma omp parallel for schedule(dynamic, 16)
+  for (std::size_t k = 0; k < met.size(); ++k) {
+    const std::uint32_t i = patch_[group][k];
+    const auto add = [&](const MetPatch& m, float part) {
+      add_to(residual_[group][k], by_patch.subspan(m.patch * lights, lights),
+             part * static_cast<float>(m.count) / static_cast<float>(ray_count_));
+    };
+    const auto share = [&](std::uint32_t j) { return area[j] / (area[i] + area[j]); };
+    for (const MetPatch& m : met[k]) add(m, row[m.patch] == kNone ? 1 : share(m.patch));
+    for (const MetPatch& m : by[k]) add(m, share(m.patch));
+  }
+}
+
+/// Adds F B, as rays tell, to what `residual_` holds.
+void WholeErrorEstimator::gather(std::span<const std::uint32_t> shown_patch,
+                                 const RayTracer& tracer, const Progress& progress) {
   const std::size_t n = data_.patches.size(), lights = radiosity_.size();
   std::vector<Float3> by_patch(n * lights);
   for (std::size_t l = 0; l < lights; ++l) {
     for (std::size_t i = 0; i < n; ++i) by_patch[i * lights + l] = radiosity_[l][i];
     std::vector<Float3>().swap(radiosity_[l]);
   }
-  const PatchTriangles triangles(data_.mesh.triangle_patch, n);
-  const std::size_t rows = patch_[0].size();
-  ParallelProgress loop(progress, kGroups * rows);
-#pragma omp parallel
-  {
-    EscapeScratch scratch;
-    MetPatchCounter counter;
-    std::vector<Float3> sum;
-#pragma omp for schedule(dynamic, 16)
-    for (std::size_t k = 0; k < kGroups * rows; ++k) {
-      if (loop.stopped()) continue;
-      const std::size_t group = k / rows, row = k % rows;
-      const std::uint32_t i = patch_[group][row];
-      measure_escape(data_.mesh, shown_patch, triangles[i], i, tracer, ray_count_,
-                     mix_bits(seed_ + kGroups + group), scratch);
-      sum.assign(lights, Float3{0, 0, 0});
-      for (const MetPatch& met : counter.count(n, scratch.met)) {
-        add_to(sum, std::span(by_patch).subspan(met.patch * lights, lights),
-               static_cast<float>(met.count) / static_cast<float>(ray_count_));
-      }
-      add_to(residual_[group][row], sum);
-      loop.advance();
-    }
+  for (std::size_t group = 0; group < kGroups; ++group) {
+    const double begin = static_cast<double>(group) / kGroups;
+    const Progress part = part_of(progress, begin, begin + 1.0 / kGroups);
+    add_gathered(group, trace(group, shown_patch, tracer, part), by_patch);
   }
-  loop.finish();
 }
 
 /// What a group says of the residual, 0 at patches that are not in it.
@@ -246,7 +294,8 @@ WholeError WholeErrorEstimator::estimate(std::span<const std::uint32_t> shown_pa
                                          const Progress& progress) {
   const std::size_t lights = compression_.size();
   if (lights == 0) return {};
-  trace(shown_patch, tracer, part_of(progress, 0, kTracingPart));
+  const Progress tracing = part_of(progress, 0, kTracingPart);
+  gather(shown_patch, tracer, tracing);
   std::vector<Replicates> of_links, of_whole;
   for (std::size_t l = 0; l < lights; ++l) {
     if (l % kLightsAtOnce == 0) {
@@ -263,6 +312,24 @@ WholeError WholeErrorEstimator::estimate(std::span<const std::uint32_t> shown_pa
   const auto arrived = [&](std::size_t k) { return received_.reference(k); };
   return {error_over_lights(of_links, arrived), error_over_lights(of_whole, arrived),
           static_cast<int>(lights)};
+}
+
+SampledError error_of_links(const TransferData& data, std::span<const std::uint32_t> shown_patch,
+                            const RayTracer& tracer, const PatchRoles& roles, std::uint64_t seed,
+                            const Progress& progress) {
+  const ReferenceSolver solver(data.links, data.patches);
+  WholeErrorEstimator estimator(data, roles, seed,
+                                WholeErrorEstimator::sample_for(data.patches.size(), kJudgingRays));
+  const std::vector<std::vector<Float3>> lights = random_initial_exitances(
+      data, tracer, LightKind::kPoint, kJudgingLights, mix_bits(seed + kJudgingLights), roles);
+  const auto truths = solver.indirect_irradiances(lights, kSpreadResidual, kJudgingResidual);
+  for (std::size_t k = 0; k < lights.size(); ++k) {
+    if (arrives_nowhere(truths[k], lights[k], data.patches.area)) continue;
+    std::vector<Float3> received = truths[k];
+    roles.keep(PatchRoles::kReceiver, received);
+    estimator.add(lights[k], truths[k], received);
+  }
+  return estimator.estimate(shown_patch, tracer, solver, progress).links;
 }
 
 }  // namespace rebounce

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "precompute/base/progress.h"
+#include "precompute/exchange/pairs/hemisphere_exchange.h"
 #include "precompute/lights/error_reference.h"
 #include "precompute/lights/reference_solution.h"
 #include "rebounce/build_report.h"
@@ -38,8 +39,8 @@ class WholeErrorEstimator {
     int ray_count = 1024;            ///< of each of these patches
   };
 
-  /// The sample for so many patches: as many rays as memory and noise ask for.
-  static Sample sample_for(std::size_t patch_count);
+  /// The sample for so many patches: as many rays as memory and noise ask for, or a `part` of them.
+  static Sample sample_for(std::size_t patch_count, double part = 1);
 
   /// `data` must outlive the object. The same `seed` gives the same estimate.
   WholeErrorEstimator(const TransferData& data, const PatchRoles& roles, std::uint64_t seed,
@@ -65,8 +66,15 @@ class WholeErrorEstimator {
     double of_compression = 0;
   };
 
-  void trace(std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
-             const Progress& progress);
+  /// Of each patch of a group.
+  using MetRows = std::vector<std::vector<MetPatch>>;
+
+  MetRows trace(std::size_t group, std::span<const std::uint32_t> shown_patch,
+                const RayTracer& tracer, const Progress& progress) const;
+  MetRows met_by(std::size_t group, const MetRows& met, std::span<const std::uint32_t> row) const;
+  void add_gathered(std::size_t group, const MetRows& met, std::span<const Float3> by_patch);
+  void gather(std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
+              const Progress& progress);
   std::vector<Float3> residual(std::size_t group, std::size_t light) const;
   void spread(const ReferenceSolver& reference, std::size_t first, std::size_t count);
   Products products(std::size_t light) const;
@@ -83,5 +91,12 @@ class WholeErrorEstimator {
   std::vector<std::vector<Float3>> missing_;  ///< of the lights at work, by light and group
   ErrorReference received_;
 };
+
+/// What the light of data.links is off by under a few point lights, for a decision: an eighth of
+/// the lights and a quarter of the rays of the check. Memory and arguments are those of
+/// WholeErrorEstimator. Throws Cancelled if asked to stop.
+SampledError error_of_links(const TransferData& data, std::span<const std::uint32_t> shown_patch,
+                            const RayTracer& tracer, const PatchRoles& roles, std::uint64_t seed,
+                            const Progress& progress = {});
 
 }  // namespace rebounce

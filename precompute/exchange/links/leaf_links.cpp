@@ -15,17 +15,32 @@ struct LeafLinks::Scratch {
 };
 
 LeafLinks::LeafLinks(const LinkTree& tree, std::span<Link> links)
-    : links_(links), begin_(tree.patches().size() + 1, 0) {
+    : links_(links), begin_(tree.patches().size() + 1, 0), involved_(tree.patches().size(), 0) {
   for (std::size_t l = 0; l < links.size(); ++l) {
     const LinkNode &a = tree[links[l].a], &b = tree[links[l].b];
     if (!a.is_leaf() || !b.is_leaf()) continue;
     const auto [row, column] = std::minmax({tree.leaf_patch(a), tree.leaf_patch(b)});
     pairs_.push_back({row, column, l});
     ++begin_[row + 1];
+    involved_[row] = involved_[column] = 1;
   }
   std::ranges::sort(pairs_, {}, [](const Pair& pair) { return std::tie(pair.row, pair.column); });
   for (std::size_t i = 1; i < begin_.size(); ++i) begin_[i] += begin_[i - 1];
   count_.resize(pairs_.size(), 0);
+}
+
+std::vector<double> LeafLinks::counted_variance(const PatchGeometry& geometry,
+                                                const CountedExchange& counted) const {
+  std::vector<double> sum(involved_.size(), 0.0);
+  for (std::size_t k = 0; k < pairs_.size(); ++k) {
+    const std::uint32_t i = pairs_[k].row, j = pairs_[k].column;
+    if (!is_coarse_pair(geometry, i, j)) continue;
+    const double found = counted.exchange(i, j, count_[k]);
+    const double variance = counted.variance(i, j, found) / (geometry.area(i) * geometry.area(j));
+    sum[i] += variance;
+    sum[j] += variance;
+  }
+  return sum;
 }
 
 void LeafLinks::count(std::uint32_t i, std::span<const MetPatch> met) {

@@ -22,6 +22,14 @@ class LeafLinks {
 
   bool empty() const { return pairs_.empty(); }
 
+  /// True for a patch with one of the links.
+  bool involves(std::uint32_t patch) const { return involved_[patch] != 0; }
+
+  /// The variance of coarse links, of which hemisphere rays alone tell, as counted so far: for each
+  /// patch [n] that of its entries of A^1/2 F A^-1/2, added up.
+  std::vector<double> counted_variance(const PatchGeometry& geometry,
+                                       const CountedExchange& counted) const;
+
   /// Counts what the hemisphere rays of patch i met, ascending. Several threads may count at once.
   void count(std::uint32_t i, std::span<const MetPatch> met);
 
@@ -45,9 +53,10 @@ class LeafLinks {
                    int probe_rays, Scratch& scratch);
 
   std::span<Link> links_;
-  std::vector<Pair> pairs_;           ///< ascending by row and column
-  std::vector<std::size_t> begin_;    ///< [n + 1] first pair of each row
-  std::vector<std::uint32_t> count_;  ///< hemisphere rays of each pair, from either side
+  std::vector<Pair> pairs_;             ///< ascending by row and column
+  std::vector<std::size_t> begin_;      ///< [n + 1] first pair of each row
+  std::vector<std::uint8_t> involved_;  ///< [n]
+  std::vector<std::uint32_t> count_;    ///< hemisphere rays of each pair, from either side
 };
 
 }  // namespace rebounce

@@ -62,7 +62,7 @@ HemisphereExchange::HemisphereExchange(const std::vector<std::vector<MetPatch>>&
 }
 
 double CountedExchange::area_per_ray(std::uint32_t i, std::uint32_t j) const {
-  return area_[i] * area_[j] / ((area_[i] + area_[j]) * ray_count_);
+  return area_[i] * area_[j] / (area_[i] * ray_count_[j] + area_[j] * ray_count_[i]);
 }
 
 HemisphereExchange::Pair HemisphereExchange::find(std::uint32_t i, std::uint32_t j) const {

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace rebounce {
@@ -31,13 +32,16 @@ class MetPatchCounter {
 /// visibility are worst.
 class CountedExchange {
  public:
-  /// `area` [n] in m²; `ray_count` cosine-distributed rays leave each patch.
+  /// `area` [n] in m²; `ray_count` cosine-distributed rays leave each patch, or as many as are
+  /// listed for it [n].
   CountedExchange(std::span<const double> area, int ray_count)
-      : area_(area.begin(), area.end()), ray_count_(ray_count) {}
+      : CountedExchange(area, std::vector<double>(area.size(), ray_count)) {}
+  CountedExchange(std::span<const double> area, std::vector<double> ray_count)
+      : area_(area.begin(), area.end()), ray_count_(std::move(ray_count)) {}
 
   /// The exchange in m² that `count` rays from either side tell of. Both sides are weighted by the
-  /// inverse of their variances: n_i of N rays from area A_i and n_j of N from A_j give
-  /// (n_i + n_j) A_i A_j / ((A_i + A_j) N), whatever the exchange.
+  /// inverse of their variances: n_i of N_i rays from area A_i and n_j of N_j from A_j give
+  /// (n_i + n_j) / (N_i / A_i + N_j / A_j), whatever the exchange.
   double exchange(std::uint32_t i, std::uint32_t j, std::uint32_t count) const {
     return count * area_per_ray(i, j);
   }
@@ -51,8 +55,7 @@ class CountedExchange {
  private:
   double area_per_ray(std::uint32_t i, std::uint32_t j) const;
 
-  std::vector<double> area_;
-  double ray_count_;
+  std::vector<double> area_, ray_count_;
 };
 
 /// The exchange of all pairs of patches estimated from hemisphere rays; rows add up.

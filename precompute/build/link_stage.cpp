@@ -1,0 +1,100 @@
+#include "precompute/build/link_stage.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "precompute/build/build_estimate.h"
+#include "precompute/build/operator_stage.h"
+#include "precompute/exchange/links/links.h"
+#include "precompute/lights/whole_error.h"
+
+namespace rebounce {
+namespace {
+
+// Links are made so often at most. The last are kept, whatever they are off.
+constexpr int kMostRounds = 3;
+
+// What links may be off, as a part of the tolerance, before they are made finer: with what
+// compression is off, usually 0.6 of the tolerance, the whole error is then within it (lab/122).
+constexpr double kAccepted = 0.7;
+
+// The error of links grows with this power of their epsilon, and their number with that of its
+// inverse (lab/122).
+constexpr double kErrorPower = 0.7, kCountPower = 0.5;
+
+// From one round to the next epsilon falls to these parts of itself. Where it does not bring the
+// error down, it is not what binds, and links are not made again.
+constexpr double kLeastStep = 0.3, kMostStep = 0.7, kLeastGain = 0.85;
+
+/// Patches and mesh of a model, as long as the object lives in the data of a build.
+class LentPatches {
+ public:
+  LentPatches(PatchModel& model, TransferData& data) : model_(model), data_(data) { exchange(); }
+  ~LentPatches() { exchange(); }
+  LentPatches(const LentPatches&) = delete;
+  LentPatches& operator=(const LentPatches&) = delete;
+
+ private:
+  void exchange() {
+    std::swap(model_.patches, data_.patches);
+    std::swap(model_.mesh, data_.mesh);
+  }
+
+  PatchModel& model_;
+  TransferData& data_;
+};
+
+/// The epsilon with which links are off by what they aim at, within limits.
+double finer_epsilon(double epsilon, double error, double tolerance) {
+  const double wanted = std::pow(kLinksPart * tolerance / error, 1 / kErrorPower);
+  return epsilon * std::clamp(wanted, kLeastStep, kMostStep);
+}
+
+/// True if as many links as epsilon times `step` gives fit into the memory limit.
+bool finer_fit(const PatchModel& model, const PatchRoles& roles, const BuildSettings& decided,
+               std::size_t link_count, double step) {
+  const double finer = static_cast<double>(link_count) * std::pow(step, -kCountPower);
+  LinkedBuild build =
+      linked_build(built_scene(model.patches.size(), model.mesh), link_count,
+                   model.patches.reflectance, roles, kCompressionPart * decided.tolerance);
+  build.link_count = static_cast<std::size_t>(finer);
+  const std::uint64_t limit = decided.memory_limit_bytes;
+  return std::max(peak_bytes_of_links(build), peak_bytes_after_links(build, limit)) <= limit;
+}
+
+}  // namespace
+
+EscapedLight find_links(PatchModel& model, const RayTracer& tracer, const PatchRoles& roles,
+                        bool judged, BuildSettings& decided, TransferData& data,
+                        BuildReport& report, PhaseClock& clock) {
+  double& epsilon = decided.form_factors.link_epsilon;
+  report.ray_count = report.pair_count = 0;
+  double last_error = 0;
+  for (int round = 1;; ++round) {
+    LinkBuild build =
+        clock.run(round == 1 ? "form factors" : "finer links", [&](const Progress& part) {
+          return build_links(model, tracer, decided.form_factors, {}, part);
+        });
+    report.ray_count += build.ray_count;
+    report.pair_count += build.candidate_count;
+    report.link_count = build.links.pair.size();
+    report.closure = build.closure;
+    data.links = std::move(build.links);
+    if (!judged || round == kMostRounds) return build;
+    const double error = clock.run("check of links", [&](const Progress& part) {
+      const LentPatches lent(model, data);
+      return error_of_links(data, model.shown_patch, tracer, roles, decided.form_factors.seed, part)
+          .mean;
+    });
+    const bool helps = round == 1 || error < kLeastGain * last_error;
+    if (error <= kAccepted * decided.tolerance || !helps) return build;
+    const double finer = finer_epsilon(epsilon, error, decided.tolerance);
+    if (!finer_fit(model, roles, decided, report.link_count, finer / epsilon)) return build;
+    epsilon = finer;
+    last_error = error;
+    data.links = {};
+  }
+}
+
+}  // namespace rebounce
