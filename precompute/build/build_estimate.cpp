@@ -4,7 +4,6 @@
 #include <omp.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "precompute/base/process_memory.h"
 #include "precompute/build/operator_stage.h"
@@ -67,10 +66,6 @@ constexpr std::size_t kLinkBytesKept = kFlatLinkBytes + LinkedFormFactors::kByte
 // A patch beside links: compressed form factors and what they are fitted to, without the lights.
 constexpr std::size_t kPatchBytes = 3000;
 
-// The links of a patch over the cube root of the number of patches: furnished rooms have 10 to 16
-// at the default tolerance, empty ones half of it (lab/117).
-constexpr double kLinksOfPatch = 10;
-
 std::string in_gib(std::uint64_t bytes) {
   return fmt::format("{:.3g} GiB", static_cast<double>(bytes) / (1ULL << 30));
 }
@@ -86,11 +81,6 @@ CostEstimate estimate_of(std::size_t patch_count, const PatchRoles& roles) {
 std::uint64_t bytes_beside_transfer(const LinkedBuild& build) {
   return build.held_bytes + kPatchBytes * build.scene.patch_count +
          kLinkBytesKept * build.link_count;
-}
-
-std::size_t usual_link_count(std::size_t patch_count) {
-  const auto n = static_cast<double>(patch_count);
-  return static_cast<std::size_t>(kLinksOfPatch * std::cbrt(n) * n);
 }
 
 std::uint64_t bytes_of_libraries(std::size_t patch_count) {
@@ -177,7 +167,7 @@ std::uint64_t memory_of_matrix_free_transfer(const LinkedBuild& build, std::uint
 }
 
 CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
-                           const BuildSettings& decided) {
+                           const BuildSettings& decided, std::size_t link_count) {
   const BuiltScene scene = built_scene(model.patches.size(), model.mesh);
   const std::uint32_t matrices = distinct_channels(model.patches.reflectance);
   CostEstimate estimate = estimate_of(scene.patch_count, roles);
@@ -187,12 +177,9 @@ CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
         bytes_of_receiver_rows(model, decided.receiver_rows);
     return estimate;
   }
-  const LinkedBuild build{scene,
-                          resident_memory_bytes(),
-                          usual_link_count(scene.patch_count),
-                          matrices,
-                          roles,
-                          kCompressionPart * decided.tolerance};
+  const LinkedBuild build{scene,      resident_memory_bytes(),
+                          link_count, matrices,
+                          roles,      kCompressionPart * decided.tolerance};
   estimate.peak_bytes = peak_bytes_of_links(build);
   if (decided.operator_kind != OperatorKind::kNoOperator) {
     estimate.peak_bytes =

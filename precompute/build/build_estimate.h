@@ -65,9 +65,9 @@ std::uint64_t peak_bytes_after_links(const LinkedBuild& build, std::uint64_t lim
 std::uint64_t memory_of_matrix_free_transfer(const LinkedBuild& build, std::uint64_t limit_bytes);
 
 /// The memory that form factors and operator need, without times. `decided`: settings that leave
-/// nothing open. The number of links is that of a furnished room until links are found.
+/// nothing open. `link_count` is forecast (forecast_link_count), and 0 for pairs.
 CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
-                           const BuildSettings& decided);
+                           const BuildSettings& decided, std::size_t link_count);
 
 /// Adds the time that form factors and a dense inverse from pairs take, by short samples of either.
 /// Throws Cancelled if asked to stop.

@@ -93,7 +93,11 @@ void LeafLinks::measure_row(std::uint32_t i, const PatchGeometry& geometry,
   auto entry = scratch.entries.begin();
   for (const Pair& pair : row(i)) {
     const bool exchanges = entry != scratch.entries.end() && entry->column == pair.column;
-    links_[pair.link].exchange_area = exchanges ? (entry++)->exchange_area : 0;
+    Link& link = links_[pair.link];
+    link.exchange_area = exchanges ? entry->exchange_area : 0;
+    link.visibility_variance = exchanges ? entry->visibility_variance : 0;
+    link.unoccluded_area = exchanges ? entry->unoccluded_area : link.unoccluded_area;
+    if (exchanges) ++entry;
   }
 }
 

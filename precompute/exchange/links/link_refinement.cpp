@@ -65,6 +65,45 @@ std::size_t LinkRefinement::revise(const std::vector<bool>& doubtful, const Prog
   return kept;
 }
 
+double LinkRefinement::forecast(std::size_t sample, const Progress& progress) {
+  double count = 0, weight = 1;
+  std::vector<Candidate> generation{{0, 0, View::kUnknown}};
+  std::vector<Outcome> outcomes;
+  while (!generation.empty()) {
+    if (generation.size() > sample) {
+      const double step = static_cast<double>(generation.size()) / static_cast<double>(sample);
+      for (std::size_t k = 0; k < sample; ++k) {
+        generation[k] = generation[static_cast<std::size_t>((static_cast<double>(k) + 0.5) * step)];
+      }
+      generation.resize(sample);
+      weight *= step;
+    }
+    outcomes.assign(generation.size(), {});
+    decide(generation, outcomes, progress);
+    std::vector<Candidate> next;
+    for (std::size_t k = 0; k < generation.size(); ++k) {
+      const Outcome& outcome = outcomes[k];
+      if (outcome.kind == Outcome::Kind::kLink) {
+        const Link& link = outcome.link;
+        const bool leaves = tree_[link.a].is_leaf() && tree_[link.b].is_leaf();
+        if (leaves || link.exchange_area > 0) count += weight;
+      } else if (outcome.kind != Outcome::Kind::kNothing) {
+        append_children(generation[k], outcome, next);
+      }
+    }
+    generation = std::move(next);
+  }
+  return count;
+}
+
+std::size_t LinkRefinement::add(std::span<const std::pair<std::uint32_t, std::uint32_t>> leaves) {
+  std::vector<Candidate> candidates;
+  for (const auto& [a, b] : leaves) candidates.push_back({a, b, View::kUnknown});
+  const std::size_t kept = links_.size();
+  refine(std::move(candidates), {});
+  return kept;
+}
+
 void LinkRefinement::refine(std::vector<Candidate> generation, const Progress& progress) {
   std::vector<Outcome> outcomes;
   while (!generation.empty()) {

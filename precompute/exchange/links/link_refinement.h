@@ -23,6 +23,8 @@ struct Link {
   float exchange_area;            ///< m²
   float unoccluded_area;          ///< m²: the exchange area with nothing between, the upper limit
   Float3 gradient_a, gradient_b;  ///< m
+  /// Between two patches: variance of exchange_area / unoccluded_area. Of nodes it is not known: 0.
+  float visibility_variance = 0;
 };
 
 /// Hierarchical refinement (P. Hanrahan, D. Salzman and L. Aupperle, "A rapid hierarchical
@@ -53,6 +55,14 @@ class LinkRefinement {
   /// Examines every link of a patch that is `doubtful` [n] again, with all rays. Where the rays
   /// disagree, the link is split down to that patch. The links from the returned number on are new.
   std::size_t revise(const std::vector<bool>& doubtful, const Progress& progress);
+
+  /// The number of links that run() makes, without those between nodes that are hidden from each
+  /// other: from `sample` pairs of each generation, spread over it. Changes no links.
+  double forecast(std::size_t sample, const Progress& progress);
+
+  /// Adds links between single patches, which must be in no other link that exchanges light. The
+  /// links from the returned number on are new.
+  std::size_t add(std::span<const std::pair<std::uint32_t, std::uint32_t>> leaves);
 
   /// Every pair of patches that can exchange light is in at most one link. Links with an exchange
   /// area of 0 are pairs that are hidden from each other.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "runtime/rays/float3_glm.h"
 
@@ -152,6 +153,44 @@ bool is_certain(const LinkTree& tree, const Link& link) {
          link.exchange_area == link.unoccluded_area;
 }
 
+/// Lets links between patches give way, each in proportion to its variance, as pairs do
+/// (enforce_closure), until the rows of all links add up to `wanted` [n] where they can. `sum` [n]:
+/// the present sums.
+void close_leaves(const LinkTree& tree, std::span<Link> links, std::span<const double> wanted,
+                  std::span<const double> sum, std::span<const RowSumTarget> target) {
+  std::vector<double> area(sum.size());
+  for (const LinkNode& node : tree.nodes()) {
+    if (node.is_leaf()) area[tree.leaf_patch(node)] = node.area;
+  }
+  std::vector<std::size_t> given;  // links that may give way, by their rows
+  const auto row_of = [&](std::size_t l) {
+    return std::minmax({tree.leaf_patch(tree[links[l].a]), tree.leaf_patch(tree[links[l].b])});
+  };
+  for (std::size_t l = 0; l < links.size(); ++l) {
+    if (links[l].visibility_variance > 0 && links[l].exchange_area > 0) given.push_back(l);
+  }
+  std::ranges::sort(given, {}, row_of);
+  ExchangeRows rows(sum.size());
+  for (const std::size_t l : given) {
+    const auto [i, j] = row_of(l);
+    rows[i].push_back(
+        {j, links[l].exchange_area, links[l].unoccluded_area, links[l].visibility_variance});
+  }
+  // What other links lack is left to these: the wanted sums are those of links between patches.
+  const std::vector<double> held = row_sums(rows, area);
+  std::vector<RowSumTarget> wanted_of_leaves;
+  for (std::size_t i = 0; i < sum.size(); ++i) {
+    const double rest = wanted[i] - (sum[i] - held[i]);
+    wanted_of_leaves.push_back({std::max(0.0, rest), target[i].deviation});
+  }
+  enforce_closure(rows, area, wanted_of_leaves);
+  std::vector<std::size_t> next(rows.size(), 0);
+  for (const std::size_t l : given) {
+    const auto [i, j] = row_of(l);
+    links[l].exchange_area = rows[i][next[i]++].exchange_area;
+  }
+}
+
 /// Divides links between patches by their factors, except where these are 0.
 void divide(const LinkTree& tree, std::span<const double> factor, std::span<Link> links) {
   const auto of = [&](std::uint32_t leaf) {
@@ -208,6 +247,7 @@ LinkScaling scale_links(const LinkTree& tree, std::span<Link> links,
   result.closure.row_sum_error_before = largest_row_error(row, target, /*certain=*/false);
   factor = first_factors(target);
   const std::vector<double> wanted = wanted_sums(scaled_row_sums(tree, links, factor), target);
+  close_leaves(tree, rest, wanted, scaled_row_sums(tree, links, factor), target);
 
   std::vector<double> of_rest = wanted;
   const std::vector<double> held = scaled_row_sums(tree, certain, factor);

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "precompute/base/parallel_progress.h"
+#include "precompute/exchange/links/hidden_links.h"
 #include "precompute/exchange/links/leaf_links.h"
 #include "precompute/exchange/links/link_scaling.h"
 #include "runtime/rays/sampling.h"
@@ -20,6 +21,9 @@ constexpr double kLinkRowSumTolerance = 0.02;
 // its other links are together (lab/123). Noise falls with the inverse of this root of the number
 // of rays (lab/007), which grows to this multiple at most.
 constexpr double kCoarseNoise = 10, kRaysOfNoise = 1.6, kMostHemispheres = 32;
+
+// Pairs of each generation that a forecast looks at: its deviation is some 5 % (lab/123).
+constexpr std::size_t kForecastPairs = 4096;
 
 /// The settings with the probe rays that rows of pairs get where they are off: what probe rays miss
 /// of links is 0.2 % of the light (lab/117).
@@ -55,21 +59,55 @@ class LinkMeasurement {
     measure(links, involved, escape, progress);
   }
 
+  /// Adds links between single patches that hemisphere rays join although shadow rays between
+  /// nodes found them hidden, and measures these.
+  void add_seen(LinkRefinement& refinement, const LinkTree& tree, const Progress& progress) {
+    const HiddenLinks hidden(tree, refinement.links());
+    if (hidden.empty()) return;
+    const std::size_t n = model_.patches.size();
+    const std::vector<double> rays(n, settings_.hemisphere_rays);
+    std::vector<std::vector<MetPatch>> seen(n);
+    trace_hemispheres(rays, settings_.seed, part_of(progress, 0.0, 0.5),
+                      [&](std::uint32_t i, const Escape&, std::span<const MetPatch> met) {
+                        seen[i] = hidden.seen(i, met);
+                      });
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> leaves;
+    for (std::uint32_t i = 0; i < n; ++i) {
+      for (const MetPatch& m : seen[i]) {
+        leaves.push_back(std::minmax({hidden.leaf(i), hidden.leaf(m.patch)}));
+      }
+    }
+    std::ranges::sort(leaves);
+    leaves.erase(std::unique(leaves.begin(), leaves.end()), leaves.end());
+    const std::size_t known = refinement.add(leaves);
+    LeafLinks added(tree, refinement.links().subspan(known));
+    for (std::uint32_t i = 0; i < n; ++i) added.count(i, seen[i]);
+    measure(added, rays, part_of(progress, 0.5, 1.0));
+  }
+
   std::uint64_t ray_count() const { return ray_count_; }
 
  private:
+  /// Measures `links` from what `rays` [n] of each patch have counted.
+  void measure(LeafLinks& links, std::vector<double> rays, const Progress& progress) {
+    const CountedExchange counted(geometry_.areas(), std::move(rays));
+    const PairExchange exchange(shadow_rays_, tracer_, counted, settings_);
+    ray_count_ += links.measure(geometry_, exchange, settings_.probe_rays, progress);
+  }
+
   void measure(LeafLinks& links, const std::vector<bool>& wanted, std::vector<Escape>& escape,
                const Progress& progress) {
     std::vector<double> rays(escape.size(), settings_.hemisphere_rays), more(rays.size(), 0.0);
     for (std::size_t i = 0; i < rays.size(); ++i) more[i] = wanted[i] ? rays[i] : 0;
-    trace_hemispheres(more, settings_.seed, links, escape, part_of(progress, 0.0, 0.3));
+    const auto keep = [&](std::uint32_t i, const Escape& of_patch, std::span<const MetPatch> met) {
+      escape[i] = of_patch;
+      links.count(i, met);
+    };
+    trace_hemispheres(more, settings_.seed, part_of(progress, 0.0, 0.3), keep);
     more = further_rays(links, CountedExchange(geometry_.areas(), rays));
-    trace_hemispheres(more, mix_bits(settings_.seed), links, escape, part_of(progress, 0.3, 0.6));
+    trace_hemispheres(more, mix_bits(settings_.seed), part_of(progress, 0.3, 0.6), keep);
     for (std::size_t i = 0; i < rays.size(); ++i) rays[i] += more[i];
-    const CountedExchange counted(geometry_.areas(), std::move(rays));
-    const PairExchange exchange(shadow_rays_, tracer_, counted, settings_);
-    ray_count_ +=
-        links.measure(geometry_, exchange, settings_.probe_rays, part_of(progress, 0.6, 1.0));
+    measure(links, std::move(rays), part_of(progress, 0.6, 1.0));
   }
 
   /// Rays that leave each patch beside the first ones, so that what its coarse links exchange is
@@ -85,10 +123,12 @@ class LinkMeasurement {
     return more;
   }
 
-  /// Traces `count` [n] rays. Where there are any, what escapes is taken from them.
-  void trace_hemispheres(std::span<const double> count, std::uint64_t seed, LeafLinks& links,
-                         std::vector<Escape>& escape, const Progress& progress) {
-    const std::size_t n = escape.size();
+  /// Traces `count` [n] rays of each patch. `keep`(i, escape, met) is called where there are any,
+  /// from several threads.
+  template <typename Keep>
+  void trace_hemispheres(std::span<const double> count, std::uint64_t seed,
+                         const Progress& progress, const Keep& keep) {
+    const std::size_t n = count.size();
     ParallelProgress loop(progress, n);
 #pragma omp parallel
     {
@@ -97,9 +137,9 @@ class LinkMeasurement {
 #pragma omp for schedule(dynamic, 16)
       for (std::uint32_t i = 0; i < n; ++i) {
         if (loop.stopped() || count[i] == 0) continue;
-        escape[i] = measure_escape(model_.mesh, model_.shown_patch, triangles_[i], i, tracer_,
-                                   static_cast<int>(count[i]), seed, scratch);
-        links.count(i, counter.count(n, scratch.met));
+        const Escape escape = measure_escape(model_.mesh, model_.shown_patch, triangles_[i], i,
+                                             tracer_, static_cast<int>(count[i]), seed, scratch);
+        keep(i, escape, counter.count(n, scratch.met));
         loop.advance();
       }
     }
@@ -132,13 +172,23 @@ RefinedLinks refine_links(const PatchModel& model, const ShadowRays& shadow_rays
   const std::vector<double> ones(model.patches.size(), 1.0);
   const std::vector<double> sum = gather_links(result.tree, refinement.links(), ones);
   const std::size_t kept = refinement.revise(
-      find_doubtful_rows(sum, result.target, kLinkRowSumTolerance), part_of(progress, 0.5, 0.9));
+      find_doubtful_rows(sum, result.target, kLinkRowSumTolerance), part_of(progress, 0.5, 0.8));
   LeafLinks revised(result.tree, refinement.links().subspan(kept));
-  if (!revised.empty()) measurement.revise(revised, part_of(progress, 0.9, 1.0));
+  if (!revised.empty()) measurement.revise(revised, part_of(progress, 0.8, 0.9));
+  measurement.add_seen(refinement, result.tree, part_of(progress, 0.9, 1.0));
   result.links = refinement.take_links();
   result.ray_count = refinement.ray_count() + measurement.ray_count();
   result.candidate_count = refinement.candidate_count();
   return result;
+}
+
+std::size_t forecast_link_count(const PatchModel& model, const RayTracer& tracer,
+                                const FormFactorSettings& settings, const Progress& progress) {
+  const PatchGeometry geometry(model, tracer);
+  const ShadowRays shadow_rays(geometry, settings.seed, settings.kernel_tolerance);
+  const LinkTree tree(model, geometry, {});
+  LinkRefinement refinement(tree, shadow_rays, tracer, with_more_probes(settings));
+  return static_cast<std::size_t>(refinement.forecast(kForecastPairs, progress));
 }
 
 }  // namespace rebounce

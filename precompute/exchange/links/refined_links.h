@@ -31,4 +31,9 @@ RefinedLinks refine_links(const PatchModel& model, const ShadowRays& shadow_rays
                           const RayTracer& tracer, const FormFactorSettings& settings,
                           std::span<const float> weight, const Progress& progress);
 
+/// Forecasts the number of links of a scene that exchange light, from a sample. Throws Cancelled if
+/// asked to stop.
+std::size_t forecast_link_count(const PatchModel& model, const RayTracer& tracer,
+                                const FormFactorSettings& settings, const Progress& progress = {});
+
 }  // namespace rebounce

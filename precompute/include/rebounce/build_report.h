@@ -50,7 +50,7 @@ struct CostEstimate {
   std::size_t patch_count = 0;
   std::size_t receiver_count = 0, source_count = 0;
   std::size_t link_count = 0;  ///< 0: not known yet, or there are none
-  /// As long as links are not known, they are taken to be as many as in a furnished room.
+  /// As long as links are not known, their number is forecast from a sample.
   std::uint64_t peak_bytes = 0;
   /// With pairs, what form factors and the dense inverse will take with the threads that there are,
   /// by short samples of either: rough. 0: no sample was taken.

@@ -44,7 +44,7 @@ struct FormFactorSettings {
 
 /// Error that a link may have at the default tolerance, in proportion to which it grows:
 /// notes/concepts/links.md.
-inline constexpr double kLinkEpsilon = 1.5e-4;  // lab/117
+inline constexpr double kLinkEpsilon = 1e-4;  // lab/122
 
 /// How exact form factors are, and how long they take.
 enum class FormFactorQuality : std::uint8_t {
