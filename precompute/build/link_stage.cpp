@@ -30,7 +30,13 @@ constexpr double kLeastStep = 0.3, kMostStep = 0.7, kLeastGain = 0.85;
 /// Patches and mesh of a model, as long as the object lives in the data of a build.
 class LentPatches {
  public:
-  LentPatches(PatchModel& model, TransferData& data) : model_(model), data_(data) { exchange(); }
+  LentPatches(PatchModel& model, const EscapedLight& escaped, TransferData& data)
+      : model_(model), data_(data) {
+    exchange();
+    data.patches.sky_visibility = escaped.sky_visibility;
+    data.patches.absorbed = escaped.absorbed;
+    data.sky_cells = escaped.sky_cells;
+  }
   ~LentPatches() { exchange(); }
   LentPatches(const LentPatches&) = delete;
   LentPatches& operator=(const LentPatches&) = delete;
@@ -83,7 +89,7 @@ EscapedLight find_links(PatchModel& model, const RayTracer& tracer, const PatchR
     data.links = std::move(build.links);
     if (!judged || round == kMostRounds) return build;
     const double error = clock.run("check of links", [&](const Progress& part) {
-      const LentPatches lent(model, data);
+      const LentPatches lent(model, build, data);
       return error_of_links(data, model.shown_patch, tracer, roles, decided.form_factors.seed, part)
           .mean;
     });
