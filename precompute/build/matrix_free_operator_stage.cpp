@@ -2,6 +2,7 @@
 #include <memory>
 #include <utility>
 
+#include "precompute/base/ranks.h"
 #include "precompute/build/build_estimate.h"
 #include "precompute/build/build_record.h"
 #include "precompute/build/operator_stage.h"
@@ -38,20 +39,19 @@ using Exitances = std::span<const std::vector<Float3>>;
 /// The radiosities of initial exitances. Throws Cancelled if asked to stop.
 Lights radiosities_of(const ReferenceSolver& solver, Exitances exitances,
                       const Progress& progress) {
-  Lights radiosities;
-  while (radiosities.size() < exitances.size()) {
-    if (progress && !progress(static_cast<double>(radiosities.size()) / exitances.size())) {
-      throw Cancelled();
-    }
-    const Exitances left = exitances.subspan(radiosities.size());
-    const auto some = left.first(std::min<std::size_t>(left.size(), ReferenceSolver::kBatchLights));
+  const Ranks ranks;
+  constexpr std::size_t kBatch = ReferenceSolver::kBatchLights;
+  Lights radiosities(exitances.size());
+  for (std::size_t done = 0; done < exitances.size(); done += kBatch) {
+    report_progress(progress, static_cast<double>(done) / exitances.size());
+    if (!ranks.makes(done, kBatch)) continue;
+    const Exitances some = exitances.subspan(done, std::min(kBatch, exitances.size() - done));
+    std::size_t light = done;
     for (const auto& solution : solver.radiosities(some, kFittingResidual)) {
-      std::vector<Float3>& radiosity = radiosities.emplace_back();
-      for (const auto& [r, g, b] : solution) {
-        radiosity.push_back({static_cast<float>(r), static_cast<float>(g), static_cast<float>(b)});
-      }
+      radiosities[light++] = rounded(solution);
     }
   }
+  ranks.share(std::span(radiosities), kBatch);
   return radiosities;
 }
 

@@ -4,6 +4,7 @@
 #include <functional>
 #include <numeric>
 
+#include "precompute/base/ranks.h"
 #include "precompute/lights/error_bound.h"
 #include "precompute/lights/error_reference.h"
 #include "precompute/lights/reference_lighting.h"
@@ -57,6 +58,20 @@ std::vector<KindError> measure(const TransferData& data, const RayTracer& tracer
   return result;
 }
 
+/// The truths of `lights`, of which each rank finds a batch.
+Exitances shared_truths(std::span<const std::vector<Float3>> lights, const TruthOf& truth_of) {
+  constexpr std::size_t kBatch = ReferenceSolver::kBatchLights;
+  const Ranks ranks;
+  Exitances truths(lights.size());
+  const std::size_t begin = ranks.rank() * kBatch;
+  if (begin < lights.size()) {
+    const auto mine = lights.subspan(begin, std::min(kBatch, lights.size() - begin));
+    std::ranges::move(truth_of(mine), truths.begin() + static_cast<std::ptrdiff_t>(begin));
+  }
+  ranks.share(std::span(truths), kBatch);
+  return truths;
+}
+
 }  // namespace
 
 std::vector<LightError> light_errors(const TransferData& data,
@@ -69,11 +84,11 @@ std::vector<LightError> light_errors(const TransferData& data,
   ErrorReference received;
   std::vector<std::vector<Float3>> arrived, results;
   std::vector<LightError> errors;
-  for (std::size_t done = 0; done < lights.size(); done += ReferenceSolver::kBatchLights) {
-    if (progress && !progress(static_cast<double>(done) / lights.size())) throw Cancelled();
-    const auto some = lights.subspan(
-        done, std::min<std::size_t>(lights.size() - done, ReferenceSolver::kBatchLights));
-    auto truths = truth_of(some);
+  const std::size_t together = Ranks().count() * ReferenceSolver::kBatchLights;
+  for (std::size_t done = 0; done < lights.size(); done += together) {
+    report_progress(progress, static_cast<double>(done) / lights.size());
+    const auto some = lights.subspan(done, std::min(lights.size() - done, together));
+    auto truths = shared_truths(some, truth_of);
     for (std::size_t k = 0; k < some.size(); ++k) {
       if (arrives_nowhere(truths[k], some[k], area)) continue;
       data.transfer->apply(some[k], indirect_irradiance, workspace);

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "precompute/base/parallel_progress.h"
+#include "precompute/base/ranks.h"
 #include "precompute/exchange/pairs/escape.h"
 #include "precompute/exchange/pairs/hemisphere_exchange.h"
 #include "runtime/rays/patch_points.h"
@@ -169,6 +170,7 @@ void WholeErrorEstimator::trace(std::span<const std::uint32_t> shown_patch, cons
   }
   const PatchTriangles triangles(data_.mesh.triangle_patch, n);
   const std::size_t rows = patch_[0].size();
+  const Ranks ranks;
   ParallelProgress loop(progress, kGroups * rows);
 #pragma omp parallel
   {
@@ -177,8 +179,8 @@ void WholeErrorEstimator::trace(std::span<const std::uint32_t> shown_patch, cons
     std::vector<Float3> sum;
 #pragma omp for schedule(dynamic, 16)
     for (std::size_t k = 0; k < kGroups * rows; ++k) {
-      if (loop.stopped()) continue;
       const std::size_t group = k / rows, row = k % rows;
+      if (loop.stopped() || !ranks.makes(row)) continue;
       const std::uint32_t i = patch_[group][row];
       measure_escape(data_.mesh, shown_patch, triangles[i], i, tracer, ray_count_,
                      mix_bits(seed_ + kGroups + group), scratch);
@@ -192,6 +194,7 @@ void WholeErrorEstimator::trace(std::span<const std::uint32_t> shown_patch, cons
     }
   }
   loop.finish();
+  for (auto& of_group : residual_) ranks.share(std::span(of_group));
 }
 
 /// What a group says of the residual, 0 at patches that are not in it.
