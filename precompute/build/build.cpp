@@ -6,7 +6,6 @@
 #include <set>
 #include <string_view>
 
-#include "precompute/base/ranks.h"
 #include "precompute/build/build_decisions.h"
 #include "precompute/build/build_estimate.h"
 #include "precompute/build/exchange_stage.h"
@@ -93,9 +92,6 @@ class TransferBuild {
           "lightmap", [&](const Progress&) { return make_lightmap(model_, settings_, report_); });
     }
     decided_ = decide(settings_, model_);
-    if (decided_.exchange_source == ExchangeSource::kPairs && !Ranks().alone()) {
-      throw Error("the ranks of mpirun share builds from links alone; add --form-factors links");
-    }
     report_.estimate = estimate_cost(model_, roles_, decided_);
     const bool fits = report_.estimate.peak_bytes <= decided_.memory_limit_bytes;
     if (fits && decided_.exchange_source == ExchangeSource::kPairs) forecast_pairs();
