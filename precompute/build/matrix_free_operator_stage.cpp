@@ -2,7 +2,6 @@
 #include <memory>
 #include <utility>
 
-#include "precompute/base/ranks.h"
 #include "precompute/build/build_estimate.h"
 #include "precompute/build/build_record.h"
 #include "precompute/build/operator_stage.h"
@@ -14,6 +13,7 @@
 #include "precompute/lights/fitting_lights.h"
 #include "precompute/lights/measured_error.h"
 #include "precompute/lights/reference_solution.h"
+#include "precompute/lights/solve_batches.h"
 #include "precompute/lights/whole_error.h"
 #include "rebounce/error.h"
 #include "transfer/base/area_norm.h"
@@ -39,20 +39,13 @@ using Exitances = std::span<const std::vector<Float3>>;
 /// The radiosities of initial exitances. Throws Cancelled if asked to stop.
 Lights radiosities_of(const ReferenceSolver& solver, Exitances exitances,
                       const Progress& progress) {
-  const Ranks ranks;
-  constexpr std::size_t kBatch = ReferenceSolver::kBatchLights;
-  Lights radiosities(exitances.size());
-  for (std::size_t done = 0; done < exitances.size(); done += kBatch) {
-    report_progress(progress, static_cast<double>(done) / exitances.size());
-    if (!ranks.makes(done, kBatch)) continue;
-    const Exitances some = exitances.subspan(done, std::min(kBatch, exitances.size() - done));
-    std::size_t light = done;
+  return solve_batches(exitances, progress, [&](Exitances some) {
+    Lights radiosities;
     for (const auto& solution : solver.radiosities(some, kFittingResidual)) {
-      radiosities[light++] = rounded(solution);
+      radiosities.push_back(rounded(solution));
     }
-  }
-  ranks.share(std::span(radiosities), kBatch);
-  return radiosities;
+    return radiosities;
+  });
 }
 
 /// The training, validation and test lights of the compressions.

@@ -9,6 +9,7 @@
 #include "precompute/lights/error_reference.h"
 #include "precompute/lights/reference_lighting.h"
 #include "precompute/lights/reference_solution.h"
+#include "precompute/lights/solve_batches.h"
 #include "rebounce/error.h"
 #include "transfer/base/area_norm.h"
 #include "transfer/base/parallel.h"
@@ -58,20 +59,6 @@ std::vector<KindError> measure(const TransferData& data, const RayTracer& tracer
   return result;
 }
 
-/// The truths of `lights`, of which each rank finds a batch.
-Exitances shared_truths(std::span<const std::vector<Float3>> lights, const TruthOf& truth_of) {
-  constexpr std::size_t kBatch = ReferenceSolver::kBatchLights;
-  const Ranks ranks;
-  Exitances truths(lights.size());
-  const std::size_t begin = ranks.rank() * kBatch;
-  if (begin < lights.size()) {
-    const auto mine = lights.subspan(begin, std::min(kBatch, lights.size() - begin));
-    std::ranges::move(truth_of(mine), truths.begin() + static_cast<std::ptrdiff_t>(begin));
-  }
-  ranks.share(std::span(truths), kBatch);
-  return truths;
-}
-
 }  // namespace
 
 std::vector<LightError> light_errors(const TransferData& data,
@@ -88,7 +75,7 @@ std::vector<LightError> light_errors(const TransferData& data,
   for (std::size_t done = 0; done < lights.size(); done += together) {
     report_progress(progress, static_cast<double>(done) / lights.size());
     const auto some = lights.subspan(done, std::min(lights.size() - done, together));
-    auto truths = shared_truths(some, truth_of);
+    auto truths = solve_batches(some, {}, truth_of);
     for (std::size_t k = 0; k < some.size(); ++k) {
       if (arrives_nowhere(truths[k], some[k], area)) continue;
       data.transfer->apply(some[k], indirect_irradiance, workspace);
