@@ -5,8 +5,10 @@
 #include <utility>
 
 #include "precompute/base/parallel_progress.h"
+#include "precompute/base/ranks.h"
 #include "precompute/exchange/pairs/escape.h"
 #include "precompute/lights/random_lights.h"
+#include "precompute/lights/solve_batches.h"
 #include "runtime/rays/patch_points.h"
 #include "runtime/rays/sampling.h"
 #include "transfer/base/area_norm.h"
@@ -27,13 +29,15 @@ constexpr double kStudent = 3.182;
 // Rays of a group, and of a patch of it at most (lab/111).
 constexpr std::size_t kRaysOfGroup = 1 << 23, kMostRays = 4096;
 
-// The lights whose errors are spread together, as many as are solved for together.
-constexpr std::size_t kLightsAtOnce = ReferenceSolver::kBatchLights / kGroups;
+/// Lights whose groups are spread together: a batch for each rank.
+std::size_t lights_at_once() {
+  return Ranks().count() * ReferenceSolver::kBatchLights / kGroups;
+}
 
 // The lights and the part of the rays that decide whether links are near enough, and the residual
 // of these lights, relative to the reflected light: it counts as an error of the links.
 constexpr int kJudgingLights = 32;
-constexpr double kJudgingRays = 0.25, kJudgingResidual = 1e-4;
+constexpr double kJudgingRays = 0.25, kJudgingResidual = 1e-4, kLeastResidual = 1e-10;
 
 // Rays take this part of the time of an estimate.
 constexpr double kTracingPart = 0.7;
@@ -170,6 +174,7 @@ WholeErrorEstimator::MetRows WholeErrorEstimator::trace(std::size_t group,
                                                         const Progress& progress) const {
   const std::size_t n = data_.patches.size(), rows = patch_[group].size();
   const PatchTriangles triangles(data_.mesh.triangle_patch, n);
+  const Ranks ranks;
   MetRows met(rows);
   ParallelProgress loop(progress, rows);
 #pragma omp parallel
@@ -178,7 +183,7 @@ WholeErrorEstimator::MetRows WholeErrorEstimator::trace(std::size_t group,
     MetPatchCounter counter;
 #pragma omp for schedule(dynamic, 16)
     for (std::size_t k = 0; k < rows; ++k) {
-      if (loop.stopped()) continue;
+      if (loop.stopped() || !ranks.makes(k)) continue;
       const std::uint32_t i = patch_[group][k];
       measure_escape(data_.mesh, shown_patch, triangles[i], i, tracer, ray_count_,
                      mix_bits(seed_ + kGroups + group), scratch);
@@ -187,6 +192,7 @@ WholeErrorEstimator::MetRows WholeErrorEstimator::trace(std::size_t group,
     }
   }
   loop.finish();
+  ranks.share(std::span(met));
   return met;
 }
 
@@ -213,8 +219,10 @@ void WholeErrorEstimator::add_gathered(std::size_t group, const MetRows& met,
   std::vector<std::uint32_t> row(data_.patches.size(), kNone);
   for (std::uint32_t k = 0; k < met.size(); ++k) row[patch_[group][k]] = k;
   const MetRows by = met_by(group, met, row);
+  const Ranks ranks;
 #pragma omp parallel for schedule(dynamic, 16)
   for (std::size_t k = 0; k < met.size(); ++k) {
+    if (!ranks.makes(k)) continue;
     const std::uint32_t i = patch_[group][k];
     const auto add = [&](const MetPatch& m, float part) {
       add_to(residual_[group][k], by_patch.subspan(m.patch * lights, lights),
@@ -224,6 +232,7 @@ void WholeErrorEstimator::add_gathered(std::size_t group, const MetRows& met,
     for (const MetPatch& m : met[k]) add(m, row[m.patch] == kNone ? 1 : share(m.patch));
     for (const MetPatch& m : by[k]) add(m, share(m.patch));
   }
+  ranks.share(std::span(residual_[group]));
 }
 
 /// Adds F B, as rays tell, to what `residual_` holds.
@@ -266,7 +275,9 @@ void WholeErrorEstimator::spread(const ReferenceSolver& reference, std::size_t f
     }
   }
   const auto transferred =
-      reference.indirect_irradiances(reflected, kSpreadResidual, kSpreadResidual);
+      solve_batches(reflected, {}, [&](std::span<const std::vector<Float3>> some) {
+        return reference.indirect_irradiances(some, kSpreadResidual, kSpreadResidual);
+      });
   for (std::size_t k = 0; k < missing_.size(); ++k) {
     add_to(missing_[k], transferred[k]);
     roles_.keep(PatchRoles::kReceiver, missing_[k]);
@@ -274,7 +285,7 @@ void WholeErrorEstimator::spread(const ReferenceSolver& reference, std::size_t f
 }
 
 WholeErrorEstimator::Products WholeErrorEstimator::products(std::size_t light) const {
-  const auto missing = std::span(missing_).subspan(light % kLightsAtOnce * kGroups, kGroups);
+  const auto missing = std::span(missing_).subspan(light % lights_at_once() * kGroups, kGroups);
   const std::vector<float>& area = data_.patches.area;
   const std::vector<Float3>& compression = compression_[light];
   Products result;
@@ -298,9 +309,9 @@ WholeError WholeErrorEstimator::estimate(std::span<const std::uint32_t> shown_pa
   gather(shown_patch, tracer, tracing);
   std::vector<Replicates> of_links, of_whole;
   for (std::size_t l = 0; l < lights; ++l) {
-    if (l % kLightsAtOnce == 0) {
+    if (l % lights_at_once() == 0) {
       report_progress(progress, kTracingPart + (1 - kTracingPart) * l / lights);
-      spread(reference, l, std::min(kLightsAtOnce, lights - l));
+      spread(reference, l, std::min(lights_at_once(), lights - l));
     }
     const Products p = products(l);
     of_links.push_back(
@@ -322,7 +333,9 @@ SampledError error_of_links(const TransferData& data, std::span<const std::uint3
                                 WholeErrorEstimator::sample_for(data.patches.size(), kJudgingRays));
   const std::vector<std::vector<Float3>> lights = random_initial_exitances(
       data, tracer, LightKind::kPoint, kJudgingLights, mix_bits(seed + kJudgingLights), roles);
-  const auto truths = solver.indirect_irradiances(lights, kSpreadResidual, kJudgingResidual);
+  const auto truths = solve_batches(lights, {}, [&](std::span<const std::vector<Float3>> some) {
+    return solver.indirect_irradiances(some, kLeastResidual, kJudgingResidual);
+  });
   for (std::size_t k = 0; k < lights.size(); ++k) {
     if (arrives_nowhere(truths[k], lights[k], data.patches.area)) continue;
     std::vector<Float3> received = truths[k];

@@ -1,6 +1,7 @@
 #include "precompute/exchange/links/leaf_links.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <tuple>
 
@@ -58,6 +59,7 @@ void LeafLinks::count(std::uint32_t i, std::span<const MetPatch> met) {
 
 std::uint64_t LeafLinks::measure(const PatchGeometry& geometry, const PairExchange& exchange,
                                  int probe_rays, const Progress& progress) {
+  const Ranks ranks;
   const std::size_t rows = begin_.size() - 1;
   ParallelProgress loop(progress, rows);
   std::uint64_t rays = 0;
@@ -66,14 +68,42 @@ std::uint64_t LeafLinks::measure(const PatchGeometry& geometry, const PairExchan
     Scratch scratch;
 #pragma omp for schedule(dynamic, 4)
     for (std::size_t i = 0; i < rows; ++i) {
-      if (loop.stopped()) continue;
+      if (loop.stopped() || !ranks.makes(i)) continue;
       measure_row(static_cast<std::uint32_t>(i), geometry, exchange, probe_rays, scratch);
       loop.advance();
     }
     rays += scratch.pairs.ray_count;
   }
   loop.finish();
+  share_measured(ranks);
+  ranks.add_up(std::span(&rays, 1));
   return rays;
+}
+
+/// Gives all ranks what each has measured of its rows.
+void LeafLinks::share_measured(const Ranks& ranks) {
+  if (ranks.alone()) return;
+  std::vector<std::vector<std::array<float, 2>>> by_row(begin_.size() - 1);
+  for (const Pair& pair : pairs_) {
+    const Link& link = links_[pair.link];
+    by_row[pair.row].push_back({link.exchange_area, link.variance});
+  }
+  ranks.share(std::span(by_row));
+  for (std::uint32_t i = 0; i < by_row.size(); ++i) {
+    auto next = by_row[i].begin();
+    for (const Pair& pair : row(i)) {
+      links_[pair.link].exchange_area = (*next)[0];
+      links_[pair.link].variance = (*next++)[1];
+    }
+  }
+}
+
+void LeafLinks::add_up_counts(const Ranks& ranks) {
+  if (ranks.alone()) return;
+  added_up_.resize(count_.size(), 0);
+  for (std::size_t k = 0; k < count_.size(); ++k) count_[k] -= added_up_[k];
+  ranks.add_up(std::span(count_));
+  for (std::size_t k = 0; k < count_.size(); ++k) added_up_[k] = count_[k] += added_up_[k];
 }
 
 void LeafLinks::measure_row(std::uint32_t i, const PatchGeometry& geometry,
@@ -95,8 +125,7 @@ void LeafLinks::measure_row(std::uint32_t i, const PatchGeometry& geometry,
     const bool exchanges = entry != scratch.entries.end() && entry->column == pair.column;
     Link& link = links_[pair.link];
     link.exchange_area = exchanges ? entry->exchange_area : 0;
-    link.visibility_variance = exchanges ? entry->visibility_variance : 0;
-    link.unoccluded_area = exchanges ? entry->unoccluded_area : link.unoccluded_area;
+    link.variance = exchanges ? static_cast<float>(entry->variance()) : 0;
     if (exchanges) ++entry;
   }
 }

@@ -23,8 +23,7 @@ struct Link {
   float exchange_area;            ///< m²
   float unoccluded_area;          ///< m²: the exchange area with nothing between, the upper limit
   Float3 gradient_a, gradient_b;  ///< m
-  /// Between two patches: variance of exchange_area / unoccluded_area. Of nodes it is not known: 0.
-  float visibility_variance = 0;
+  float variance = 0;  ///< m⁴, of the exchange area of two patches; of nodes it is not known
 };
 
 /// Hierarchical refinement (P. Hanrahan, D. Salzman and L. Aupperle, "A rapid hierarchical

@@ -167,14 +167,15 @@ void close_leaves(const LinkTree& tree, std::span<Link> links, std::span<const d
     return std::minmax({tree.leaf_patch(tree[links[l].a]), tree.leaf_patch(tree[links[l].b])});
   };
   for (std::size_t l = 0; l < links.size(); ++l) {
-    if (links[l].visibility_variance > 0 && links[l].exchange_area > 0) given.push_back(l);
+    if (links[l].variance > 0 && links[l].exchange_area > 0) given.push_back(l);
   }
   std::ranges::sort(given, {}, row_of);
   ExchangeRows rows(sum.size());
   for (const std::size_t l : given) {
     const auto [i, j] = row_of(l);
+    const double most = links[l].unoccluded_area, part = links[l].variance / (most * most);
     rows[i].push_back(
-        {j, links[l].exchange_area, links[l].unoccluded_area, links[l].visibility_variance});
+        {j, links[l].exchange_area, links[l].unoccluded_area, static_cast<float>(part)});
   }
   // What other links lack is left to these: the wanted sums are those of links between patches.
   const std::vector<double> held = row_sums(rows, area);

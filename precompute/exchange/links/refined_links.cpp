@@ -71,6 +71,7 @@ class LinkMeasurement {
                       [&](std::uint32_t i, const Escape&, std::span<const MetPatch> met) {
                         seen[i] = hidden.seen(i, met);
                       });
+    Ranks().share(std::span(seen));
     std::vector<std::pair<std::uint32_t, std::uint32_t>> leaves;
     for (std::uint32_t i = 0; i < n; ++i) {
       for (const MetPatch& m : seen[i]) {
@@ -103,9 +104,13 @@ class LinkMeasurement {
       escape[i] = of_patch;
       links.count(i, met);
     };
+    const Ranks ranks;
     trace_hemispheres(more, settings_.seed, part_of(progress, 0.0, 0.3), keep);
+    links.add_up_counts(ranks);
     more = further_rays(links, CountedExchange(geometry_.areas(), rays));
     trace_hemispheres(more, mix_bits(settings_.seed), part_of(progress, 0.3, 0.6), keep);
+    links.add_up_counts(ranks);
+    share(ranks, escape);
     for (std::size_t i = 0; i < rays.size(); ++i) rays[i] += more[i];
     measure(links, std::move(rays), part_of(progress, 0.6, 1.0));
   }
@@ -129,6 +134,7 @@ class LinkMeasurement {
   void trace_hemispheres(std::span<const double> count, std::uint64_t seed,
                          const Progress& progress, const Keep& keep) {
     const std::size_t n = count.size();
+    const Ranks ranks;
     ParallelProgress loop(progress, n);
 #pragma omp parallel
     {
@@ -136,7 +142,7 @@ class LinkMeasurement {
       MetPatchCounter counter;
 #pragma omp for schedule(dynamic, 16)
       for (std::uint32_t i = 0; i < n; ++i) {
-        if (loop.stopped() || count[i] == 0) continue;
+        if (loop.stopped() || count[i] == 0 || !ranks.makes(i)) continue;
         const Escape escape = measure_escape(model_.mesh, model_.shown_patch, triangles_[i], i,
                                              tracer_, static_cast<int>(count[i]), seed, scratch);
         keep(i, escape, counter.count(n, scratch.met));
