@@ -270,8 +270,8 @@ void add_form_factor_options(CLI::App& command, PrecomputeOptions& chosen) {
   command
       .add_option(
           "--link-epsilon", chosen.settings.form_factors.link_epsilon,
-          "Largest error of a link, with --form-factors links; 0: the default, 0.00015 at the "
-          "default tolerance and in proportion to it")
+          "Largest error of a link, with --form-factors links; 0: the default, 0.0001 at the "
+          "default tolerance and in proportion to it, and less where links are too far off")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   command.add_flag("--store-links", chosen.settings.store_links,

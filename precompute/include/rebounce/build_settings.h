@@ -122,7 +122,7 @@ struct BuildSettings {
   FormFactorSettings form_factors;
   /// kPairs: link_epsilon is 0.
   /// kLinks: link_epsilon 0 stands for kLinkEpsilon, times the tolerance over the default one, and
-  /// the operator is hierarchical or none.
+  /// less where the light of these links is too far off; the operator is hierarchical or none.
   ExchangeSource exchange_source = ExchangeSource::kAutomatic;
   /// Store links too, for hierarchical radiosity: fitted to the form factors of all pairs, or to
   /// the links that were found instead.

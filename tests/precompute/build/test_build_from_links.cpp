@@ -220,7 +220,9 @@ TEST(BuildFromLinks, SaysAgainWhatIsLeftWhenLinksAreKnown) {
   EXPECT_EQ(estimates[1].link_count, report.link_count);
   EXPECT_EQ(estimates[1].patch_count, report.patch_count);
   if (kGivesMemoryBack) {
-    EXPECT_LT(estimates[1].peak_bytes, estimates[0].peak_bytes) << "a bare room";
+    const auto first = static_cast<double>(estimates[0].peak_bytes),
+               second = static_cast<double>(estimates[1].peak_bytes);
+    EXPECT_NEAR(first / second, 1, 0.25) << "their number is forecast from a sample";
   }
   EXPECT_EQ(report.estimate_after_links->peak_bytes, estimates[1].peak_bytes);
 }

@@ -247,6 +247,22 @@ TEST(MatrixFreeTransfer, KeepsTheToleranceAsCompressionOfTheDenseInverseDoes) {
   EXPECT_LT(static_cast<double>(large->bytes()), 1.1 * static_cast<double>(by_dense->bytes()));
 }
 
+TEST(MatrixFreeTransfer, IsCompressedAgainFinerFromTheSameColumns) {
+  const GreyRoom& room = small_room();
+  const MatrixFreeTransfer columns(*room.form_factors, room.patches, room.lights(),
+                                   {.compression = kCoarse});
+  expect_same(*columns.compress(room.lights(), kCoarse.tolerance), uninterrupted());
+  const double tolerance = 0.6 * kCoarse.tolerance;
+  const auto finer = columns.compress(room.lights(), tolerance);
+  const auto dense = build_dense_transfer(room.exchange, room.patches, Precision::kF32);
+  const auto error = [&](const HierarchicalOperator& compressed) {
+    return test::mean_error(compressed, *dense, room.patches.area, lights_in(room.patches, 24, 3));
+  };
+  EXPECT_LT(error(*finer), tolerance);
+  EXPECT_LT(error(*finer), error(uninterrupted()));
+  EXPECT_GT(finer->bytes(), uninterrupted().bytes());
+}
+
 TEST(MatrixFreeTransfer, TakesAFewPatchesAndNoLights) {
   Scene scene = test::empty_scene();
   test::add_box(scene, {0, 0, 0}, {1, 1, 1}, true);

@@ -12,6 +12,7 @@
 #include <random>
 
 #include "precompute/exchange/links/link_fitting.h"
+#include "precompute/exchange/links/refined_links.h"
 #include "precompute/exchange/pairs/form_factors.h"
 #include "rebounce/error.h"
 #include "runtime/solvers/gauss_seidel_solver.h"
@@ -169,6 +170,16 @@ TEST(Links, WeightsDecideWhereErrorsMatter) {
   const std::size_t unweighted = links_of(model).links.pair.size();
   EXPECT_EQ(links_of(model, kLinkEpsilon, ones).links.pair.size(), unweighted);
   EXPECT_EQ(links_of(model, 0.1 * kLinkEpsilon, fewer).links.pair.size(), unweighted);
+}
+
+TEST(Links, AreForecastFromASample) {
+  // More pairs of nodes than the sample in most generations.
+  const auto& [model, build, pairs] = furnished();
+  const double found = static_cast<double>(build.links.pair.size());
+  const auto forecast = static_cast<double>(
+      forecast_link_count(model, test::make_tracer(model), {.link_epsilon = kLinkEpsilon}));
+  RecordProperty("forecast", std::to_string(forecast / found));
+  EXPECT_NEAR(forecast / found, 1, 0.2);
 }
 
 TEST(Links, NothingGoesThroughAWall) {

@@ -4,6 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <random>
+
 #include "precompute/exchange/pairs/escape.h"
 #include "precompute/exchange/pairs/form_factors.h"
 #include "tests/support/test_scenes.h"
@@ -64,6 +69,27 @@ TEST(HemisphereExchange, OfFacingSquaresIsTheirViewFactor) {
   }
   EXPECT_NEAR(sum, 0.19982489569839, 3 * std::sqrt(variance));
   EXPECT_LT(std::sqrt(variance), 2e-3);
+}
+
+TEST(CountedExchange, WeighsBothSidesByTheirRays) {
+  constexpr std::uint64_t kSeed = 20261125;
+  std::printf("seed %llu\n", static_cast<unsigned long long>(kSeed));
+  std::mt19937_64 random(kSeed);
+  std::uniform_real_distribution<double> area(0.1, 2), rays(100, 5000), part(0.01, 0.2);
+  for (int trial = 0; trial < 100; ++trial) {
+    const std::vector<double> areas{area(random), area(random)};
+    const std::vector<double> counts{std::floor(rays(random)), std::floor(rays(random))};
+    const CountedExchange counted(areas, counts);
+    const double exchange = part(random) * std::min(areas[0], areas[1]);
+    // As many rays as expected meet the other patch, from both sides.
+    const double met = exchange / areas[0] * counts[0] + exchange / areas[1] * counts[1];
+    EXPECT_NEAR(counted.expected_count(0, 1, exchange), met, 1e-9 * met);
+    const auto whole = static_cast<std::uint32_t>(std::round(met));
+    EXPECT_NEAR(counted.exchange(0, 1, whole), exchange * whole / met, 1e-9 * exchange);
+    // More rays from one side tell more.
+    const CountedExchange more(areas, {8 * counts[0], counts[1]});
+    EXPECT_LT(more.variance(0, 1, exchange), counted.variance(0, 1, exchange));
+  }
 }
 
 TEST(HemisphereExchange, ListsPairsInOrderAndFindsThem) {
