@@ -9,12 +9,10 @@
 #include "precompute/build/build_decisions.h"
 #include "precompute/build/build_estimate.h"
 #include "precompute/build/exchange_stage.h"
-#include "precompute/build/link_stage.h"
 #include "precompute/build/operator_stage.h"
 #include "precompute/build/output_stage.h"
 #include "precompute/build/phase_clock.h"
 #include "precompute/build/transfer_build.h"
-#include "precompute/exchange/links/refined_links.h"
 #include "precompute/patches/patch_model.h"
 #include "precompute/patches/patch_selection.h"
 #include "precompute/patches/winding.h"
@@ -95,7 +93,9 @@ class TransferBuild {
     }
     decided_ = decide(settings_, model_);
     const bool links = decided_.exchange_source == ExchangeSource::kLinks;
-    report_.estimate = estimate_cost(model_, roles_, decided_, links ? forecast_links() : 0);
+    if (links) tracer_.emplace(make_surface_tracer(model_.mesh));
+    const std::size_t link_count = links ? forecast_links(model_, *tracer_, decided_, clock_) : 0;
+    report_.estimate = estimate_cost(model_, roles_, decided_, link_count);
     const bool fits = report_.estimate.peak_bytes <= decided_.memory_limit_bytes;
     if (fits && decided_.exchange_source == ExchangeSource::kPairs) forecast_pairs();
     announce(report_.estimate);
@@ -156,14 +156,6 @@ class TransferBuild {
     if (!settings_.store_form_factors) data_.exchange = {};
     if (settings_.form_factor_tolerance == 0) data_.compressed_form_factors.reset();
     return std::move(data_);
-  }
-
-  /// Forecasts the number of links, from a sample.
-  std::size_t forecast_links() {
-    tracer_.emplace(make_surface_tracer(model_.mesh));
-    return clock_.run("estimate", [&](const Progress& part) {
-      return forecast_link_count(model_, *tracer_, decided_.form_factors, part);
-    });
   }
 
   /// Forecasts the time of a build from pairs, from short samples.

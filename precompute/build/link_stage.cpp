@@ -1,13 +1,13 @@
-#include "precompute/build/link_stage.h"
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "precompute/build/build_estimate.h"
+#include "precompute/build/exchange_stage.h"
 #include "precompute/build/operator_stage.h"
 #include "precompute/exchange/links/links.h"
-#include "precompute/lights/whole_error.h"
+#include "precompute/exchange/links/refined_links.h"
+#include "precompute/lights/link_error.h"
 
 namespace rebounce {
 namespace {
@@ -101,6 +101,13 @@ EscapedLight find_links(PatchModel& model, const RayTracer& tracer, const PatchR
     last_error = error;
     data.links = {};
   }
+}
+
+std::size_t forecast_links(const PatchModel& model, const RayTracer& tracer,
+                           const BuildSettings& decided, PhaseClock& clock) {
+  return clock.run("estimate", [&](const Progress& part) {
+    return forecast_link_count(model, tracer, decided.form_factors, part);
+  });
 }
 
 }  // namespace rebounce

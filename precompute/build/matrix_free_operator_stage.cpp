@@ -17,7 +17,6 @@
 #include "precompute/lights/reference_solution.h"
 #include "precompute/lights/solve_batches.h"
 #include "precompute/lights/whole_error.h"
-#include "rebounce/error.h"
 #include "transfer/base/area_norm.h"
 
 namespace rebounce {

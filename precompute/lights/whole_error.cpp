@@ -7,7 +7,6 @@
 #include "precompute/base/parallel_progress.h"
 #include "precompute/base/ranks.h"
 #include "precompute/exchange/pairs/escape.h"
-#include "precompute/lights/random_lights.h"
 #include "precompute/lights/solve_batches.h"
 #include "runtime/rays/patch_points.h"
 #include "runtime/rays/sampling.h"
@@ -33,11 +32,6 @@ constexpr std::size_t kRaysOfGroup = 1 << 23, kMostRays = 4096;
 std::size_t lights_at_once() {
   return Ranks().count() * ReferenceSolver::kBatchLights / kGroups;
 }
-
-// The lights and the part of the rays that decide whether links are near enough, and the residual
-// of these lights, relative to the reflected light: it counts as an error of the links.
-constexpr int kJudgingLights = 32;
-constexpr double kJudgingRays = 0.25, kJudgingResidual = 1e-4, kLeastResidual = 1e-10;
 
 // Rays take this part of the time of an estimate.
 constexpr double kTracingPart = 0.7;
@@ -323,26 +317,6 @@ WholeError WholeErrorEstimator::estimate(std::span<const std::uint32_t> shown_pa
   const auto arrived = [&](std::size_t k) { return received_.reference(k); };
   return {error_over_lights(of_links, arrived), error_over_lights(of_whole, arrived),
           static_cast<int>(lights)};
-}
-
-SampledError error_of_links(const TransferData& data, std::span<const std::uint32_t> shown_patch,
-                            const RayTracer& tracer, const PatchRoles& roles, std::uint64_t seed,
-                            const Progress& progress) {
-  const ReferenceSolver solver(data.links, data.patches);
-  WholeErrorEstimator estimator(data, roles, seed,
-                                WholeErrorEstimator::sample_for(data.patches.size(), kJudgingRays));
-  const std::vector<std::vector<Float3>> lights = random_initial_exitances(
-      data, tracer, LightKind::kPoint, kJudgingLights, mix_bits(seed + kJudgingLights), roles);
-  const auto truths = solve_batches(lights, {}, [&](std::span<const std::vector<Float3>> some) {
-    return solver.indirect_irradiances(some, kLeastResidual, kJudgingResidual);
-  });
-  for (std::size_t k = 0; k < lights.size(); ++k) {
-    if (arrives_nowhere(truths[k], lights[k], data.patches.area)) continue;
-    std::vector<Float3> received = truths[k];
-    roles.keep(PatchRoles::kReceiver, received);
-    estimator.add(lights[k], truths[k], received);
-  }
-  return estimator.estimate(shown_patch, tracer, solver, progress).links;
 }
 
 }  // namespace rebounce

@@ -1,0 +1,41 @@
+#include "precompute/lights/link_error.h"
+
+#include <vector>
+
+#include "precompute/lights/random_lights.h"
+#include "precompute/lights/reference_solution.h"
+#include "precompute/lights/solve_batches.h"
+#include "precompute/lights/whole_error.h"
+#include "runtime/rays/sampling.h"
+
+namespace rebounce {
+namespace {
+
+// The lights and the part of the rays that decide whether links are near enough, and the residual
+// of these lights, relative to the reflected light: it counts as an error of the links.
+constexpr int kJudgingLights = 32;
+constexpr double kJudgingRays = 0.25, kJudgingResidual = 1e-4, kLeastResidual = 1e-10;
+
+}  // namespace
+
+SampledError error_of_links(const TransferData& data, std::span<const std::uint32_t> shown_patch,
+                            const RayTracer& tracer, const PatchRoles& roles, std::uint64_t seed,
+                            const Progress& progress) {
+  const ReferenceSolver solver(data.links, data.patches);
+  WholeErrorEstimator estimator(data, roles, seed,
+                                WholeErrorEstimator::sample_for(data.patches.size(), kJudgingRays));
+  const std::vector<std::vector<Float3>> lights = random_initial_exitances(
+      data, tracer, LightKind::kPoint, kJudgingLights, mix_bits(seed + kJudgingLights), roles);
+  const auto truths = solve_batches(lights, {}, [&](std::span<const std::vector<Float3>> some) {
+    return solver.indirect_irradiances(some, kLeastResidual, kJudgingResidual);
+  });
+  for (std::size_t k = 0; k < lights.size(); ++k) {
+    if (arrives_nowhere(truths[k], lights[k], data.patches.area)) continue;
+    std::vector<Float3> received = truths[k];
+    roles.keep(PatchRoles::kReceiver, received);
+    estimator.add(lights[k], truths[k], received);
+  }
+  return estimator.estimate(shown_patch, tracer, solver, progress).links;
+}
+
+}  // namespace rebounce
