@@ -21,8 +21,8 @@ constexpr double kLeastOfRest = 0.9, kGreatestOfRest = 1.1;
 // sides of a wall and may be removed.
 constexpr double kLeastFactorUnseeing = 1e-6;
 
-// Relative deviation of the row sum of links, from penumbrae that links average
-// (lab/014).
+// Relative deviation of the row sum of links, and of that of links between nodes alone, from
+// penumbrae that links average (lab/014).
 constexpr double kSumDeviation = 0.01;
 
 /// A sum over a node, and its first moment about the centre of the node.
@@ -153,41 +153,63 @@ bool is_certain(const LinkTree& tree, const Link& link) {
          link.exchange_area == link.unoccluded_area;
 }
 
+/// The two patches of a link between patches, ascending.
+std::pair<std::uint32_t, std::uint32_t> row_and_column(const LinkTree& tree, const Link& link) {
+  return std::minmax({tree.leaf_patch(tree[link.a]), tree.leaf_patch(tree[link.b])});
+}
+
+/// What the links between two patches add to each row.
+std::vector<double> leaf_sums(const LinkTree& tree, std::span<const Link> links,
+                              std::size_t patch_count) {
+  std::vector<double> sum(patch_count, 0.0);
+  for (const Link& link : links) {
+    const LinkNode &a = tree[link.a], &b = tree[link.b];
+    if (!a.is_leaf() || !b.is_leaf()) continue;
+    sum[tree.leaf_patch(a)] += link.exchange_area / a.area;
+    if (link.a != link.b) sum[tree.leaf_patch(b)] += link.exchange_area / b.area;
+  }
+  return sum;
+}
+
+/// The links between patches whose variance is known, sorted by their rows and columns.
+std::vector<std::size_t> yielding_links(const LinkTree& tree, std::span<const Link> links) {
+  std::vector<std::size_t> yielding;
+  for (std::size_t l = 0; l < links.size(); ++l) {
+    if (links[l].variance > 0 && links[l].exchange_area > 0) yielding.push_back(l);
+  }
+  std::ranges::sort(yielding, {}, [&](std::size_t l) { return row_and_column(tree, links[l]); });
+  return yielding;
+}
+
 /// Lets links between patches give way, each in proportion to its variance, as pairs do
-/// (enforce_closure), until the rows of all links add up to `wanted` [n] where they can. `sum` [n]:
-/// the present sums.
+/// (enforce_closure), until rows add up to `wanted` [n] as nearly as links between nodes are
+/// certain. `sum` [n]: the present sums of the rows, `of_nodes`: of links between nodes alone.
 void close_leaves(const LinkTree& tree, std::span<Link> links, std::span<const double> wanted,
-                  std::span<const double> sum, std::span<const RowSumTarget> target) {
+                  std::span<const double> sum, std::span<const double> of_nodes,
+                  std::span<const RowSumTarget> target) {
   std::vector<double> area(sum.size());
   for (const LinkNode& node : tree.nodes()) {
     if (node.is_leaf()) area[tree.leaf_patch(node)] = node.area;
   }
-  std::vector<std::size_t> given;  // links that may give way, by their rows
-  const auto row_of = [&](std::size_t l) {
-    return std::minmax({tree.leaf_patch(tree[links[l].a]), tree.leaf_patch(tree[links[l].b])});
-  };
-  for (std::size_t l = 0; l < links.size(); ++l) {
-    if (links[l].variance > 0 && links[l].exchange_area > 0) given.push_back(l);
-  }
-  std::ranges::sort(given, {}, row_of);
+  const std::vector<std::size_t> yielding = yielding_links(tree, links);
   ExchangeRows rows(sum.size());
-  for (const std::size_t l : given) {
-    const auto [i, j] = row_of(l);
+  for (const std::size_t l : yielding) {
+    const auto [i, j] = row_and_column(tree, links[l]);
     const double most = links[l].unoccluded_area, part = links[l].variance / (most * most);
     rows[i].push_back(
         {j, links[l].exchange_area, links[l].unoccluded_area, static_cast<float>(part)});
   }
-  // What other links lack is left to these: the wanted sums are those of links between patches.
   const std::vector<double> held = row_sums(rows, area);
-  std::vector<RowSumTarget> wanted_of_leaves;
+  std::vector<RowSumTarget> wanted_of_rows;
   for (std::size_t i = 0; i < sum.size(); ++i) {
     const double rest = wanted[i] - (sum[i] - held[i]);
-    wanted_of_leaves.push_back({std::max(0.0, rest), target[i].deviation});
+    wanted_of_rows.push_back(
+        {std::max(0.0, rest), std::hypot(target[i].deviation, kSumDeviation * of_nodes[i])});
   }
-  enforce_closure(rows, area, wanted_of_leaves);
+  enforce_closure(rows, area, wanted_of_rows);
   std::vector<std::size_t> next(rows.size(), 0);
-  for (const std::size_t l : given) {
-    const auto [i, j] = row_of(l);
+  for (const std::size_t l : yielding) {
+    const std::uint32_t i = row_and_column(tree, links[l]).first;
     links[l].exchange_area = rows[i][next[i]++].exchange_area;
   }
 }
@@ -248,7 +270,9 @@ LinkScaling scale_links(const LinkTree& tree, std::span<Link> links,
   result.closure.row_sum_error_before = largest_row_error(row, target, /*certain=*/false);
   factor = first_factors(target);
   const std::vector<double> wanted = wanted_sums(scaled_row_sums(tree, links, factor), target);
-  close_leaves(tree, rest, wanted, scaled_row_sums(tree, links, factor), target);
+  std::vector<double> of_nodes = leaf_sums(tree, links, row.size());
+  for (std::size_t i = 0; i < row.size(); ++i) of_nodes[i] = std::max(0.0, row[i] - of_nodes[i]);
+  close_leaves(tree, rest, wanted, scaled_row_sums(tree, links, factor), of_nodes, target);
 
   std::vector<double> of_rest = wanted;
   const std::vector<double> held = scaled_row_sums(tree, certain, factor);

@@ -26,12 +26,13 @@ struct LinkScaling {
 /// This is symmetric scaling (P. A. Knight, D. Ruiz and B. Uçar, "A symmetry preserving algorithm
 /// for matrix scaling", 2014). What a row is off comes from pairs that are partly hidden and from
 /// kernels that are taken for affine, and not from single patches with nothing between them. So
-/// the links between those, which move to the front, are divided by the factors of their patches
-/// first, and only what the others leave is scaled off all alike (lab/117). A measured target
-/// counts by its certainty relative to that of the row sum. Factors stay in [0.5, 2], those of
-/// the others alone in [0.9, 1.1], with two
-/// exceptions: patches that see almost nothing may lose nearly all of their exchange, and where the
-/// target is 0 the factor is 0.
+/// the links between patches of which rays tell a part first give way by their variances
+/// (enforce_closure). Those between patches with nothing between, which move to the front, are
+/// divided by the factors of their patches first, and only what the others leave is scaled off all
+/// alike (lab/117). A measured target counts by its certainty relative to that of the row sum.
+/// Factors stay in [0.5, 2], those of the others alone in [0.9, 1.1], with two exceptions: patches
+/// that see almost nothing may lose nearly all of their exchange, and where the target is 0 the
+/// factor is 0.
 LinkScaling scale_links(const LinkTree& tree, std::span<Link> links,
                         std::span<const RowSumTarget> target);
 
