@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kScalingSteps = 30;  // each step about halves the rest
 constexpr double kScaled = 1e-6;   // a row sum this near to its target is scaled
-constexpr double kLeastFactor = 0.5, kGreatestFactor = 2;
+constexpr double kLeastFactor = 0.8, kGreatestFactor = 1.25;
 
 // The same where links between patches with nothing between them stay. Where more than that would
 // be needed, as in nooks, these are what is off.

@@ -30,9 +30,9 @@ struct LinkScaling {
 /// (enforce_closure). Those between patches with nothing between, which move to the front, are
 /// divided by the factors of their patches first, and only what the others leave is scaled off all
 /// alike (lab/117). A measured target counts by its certainty relative to that of the row sum.
-/// Factors stay in [0.5, 2], those of the others alone in [0.9, 1.1], with two exceptions: patches
-/// that see almost nothing may lose nearly all of their exchange, and where the target is 0 the
-/// factor is 0.
+/// Factors stay in [0.8, 1.25], those of the others alone in [0.9, 1.1], with two exceptions:
+/// patches that see almost nothing may lose nearly all of their exchange, and where the target is 0
+/// the factor is 0.
 LinkScaling scale_links(const LinkTree& tree, std::span<Link> links,
                         std::span<const RowSumTarget> target);
 

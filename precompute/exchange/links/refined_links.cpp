@@ -20,7 +20,7 @@ constexpr double kLinkRowSumTolerance = 0.02;
 // The noise of the coarse links of a patch, together, is at most so many epsilon: as the errors of
 // its other links are together (lab/123). Noise falls with the inverse of this root of the number
 // of rays (lab/007), which grows to this multiple at most.
-constexpr double kCoarseNoise = 10, kRaysOfNoise = 1.6, kMostHemispheres = 32;
+constexpr double kCoarseNoise = 10, kRaysOfNoise = 1.6, kMostHemispheres = 16;
 
 // Pairs of each generation that a forecast looks at: its deviation is some 5 % (lab/123).
 constexpr std::size_t kForecastPairs = 4096;
