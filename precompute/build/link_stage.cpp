@@ -2,6 +2,7 @@
 #include <cmath>
 #include <utility>
 
+#include "precompute/base/ranks.h"
 #include "precompute/build/build_estimate.h"
 #include "precompute/build/exchange_stage.h"
 #include "precompute/build/operator_stage.h"
@@ -96,7 +97,9 @@ EscapedLight find_links(PatchModel& model, const RayTracer& tracer, const PatchR
     const bool helps = round == 1 || error < kLeastGain * last_error;
     if (error <= kAccepted * decided.tolerance || !helps) return build;
     const double finer = finer_epsilon(epsilon, error, decided.tolerance);
-    if (!finer_fit(model, roles, decided, report.link_count, finer / epsilon)) return build;
+    // Ranks may have different limits, and go the same way.
+    const bool fits = finer_fit(model, roles, decided, report.link_count, finer / epsilon);
+    if (Ranks().least(fits ? 1 : 0) == 0) return build;
     epsilon = finer;
     last_error = error;
     data.links = {};
