@@ -95,7 +95,7 @@ TEST(ReceiverRows, AddNothingUnderEvenLight) {
   ASSERT_GT(rows.group_count(), 0U);
   const std::vector<Float3> even(room()->patches.size(), Float3{1, 1, 1});
   std::vector<Float3> added(room()->mesh.position.size(), Float3{0, 0, 0});
-  ReceiverProducts(rows, room()->patches.area).add(even, added);
+  ReceiverProducts(rows, room()->patches.area).add(even, {}, added);
   for (const Float3& a : added) EXPECT_NEAR(a[0], 0, 1e-3);
 }
 
@@ -154,6 +154,8 @@ TEST(ReceiverRows, RefuseWhatCannotBe) {
   test::expect_error([&] { make(data, {.tolerance = NAN}); }, "tolerance");
   test::expect_error([&] { make(data, {.most_sets = 3}); }, "from 4");
   test::expect_error([&] { make(data, {.most_sets = 1025}); }, "1024");
+  test::expect_error([&] { make(data, {.parts_per_patch = 0}); }, "from 1 to 64 parts");
+  test::expect_error([&] { make(data, {.parts_per_patch = 65}); }, "from 1 to 64 parts");
   TransferData without = data;
   without.transfer = nullptr;
   test::expect_error([&] { make(without, {}); }, "need an operator");
@@ -175,7 +177,8 @@ struct Shelf {
   /// The part of patch `seen` in the row of the vertex at the corner `x` of the floor.
   float part(float x, std::uint32_t seen) const {
     const RayTracer tracer = make_surface_tracer(mesh);
-    ReceiverViewer viewer(mesh, mesh.triangle_patch, 3, tracer, 4096);
+    const std::vector<ReceiverPoint> point(3);
+    ReceiverViewer viewer(mesh, mesh.triangle_patch, 3, point, tracer, 4096);
     std::uint32_t vertex = 0;
     std::vector<std::uint32_t> around;
     for (std::uint32_t t = 0; t < 4; ++t) {
@@ -187,8 +190,8 @@ struct Shelf {
     }
     ViewRow row;
     viewer.look_from_vertex(vertex, around, 1, row);
-    for (const auto& [patch, part] : row) {
-      if (patch == seen) return part;
+    for (const auto& [source, part] : row) {
+      if (source == seen) return part;
     }
     return 0;
   }
