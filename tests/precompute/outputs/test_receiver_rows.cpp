@@ -37,7 +37,7 @@ Scene room_of_small_things() {
   return scene;
 }
 
-TransferData build(bool with_rows, double tolerance = 0.01, int parts = 8) {
+TransferData build(bool with_rows, double tolerance = 0.01, int parts = 1) {
   BuildSettings settings;
   settings.receiver_rows.parts_per_patch = parts;
   settings.subdivision.patch_count = 60;
@@ -51,6 +51,12 @@ TransferData build(bool with_rows, double tolerance = 0.01, int parts = 8) {
 
 const std::shared_ptr<const TransferData>& room() {
   static const auto data = std::make_shared<const TransferData>(build(true));
+  return data;
+}
+
+/// The same, where rows tell eight parts of each patch apart.
+const std::shared_ptr<const TransferData>& room_of_parts() {
+  static const auto data = std::make_shared<const TransferData>(build(true, 0.01, 8));
   return data;
 }
 
@@ -145,42 +151,44 @@ TEST(ReceiverRows, PartsTellWhereALampLightsPatches) {
       return irradiance_of_lit_places(engine, light, place, normal);
     });
   };
-  const double of_parts = error_with(room());
-  const double of_patches = error_with(std::make_shared<const TransferData>(build(true, 0.01, 1)));
+  const double of_parts = error_with(room_of_parts()), of_patches = error_with(room());
   std::printf("relative L2 error: %.4f with parts, %.4f by patches\n", of_parts, of_patches);
   EXPECT_LT(of_parts, 0.7 * of_patches);
 }
 
 TEST(ReceiverRows, LightOfTheCallerIsEvenOnPatches) {
-  Engine engine(room());
+  Engine engine(room_of_parts());
   const Light light = lamp();
   engine.relight({&light, 1}, {});
-  std::vector<Float3> of_lamp(room()->mesh.position.size()), even = of_lamp, expected = of_lamp;
+  std::vector<Float3> of_lamp(room_of_parts()->mesh.position.size()), even = of_lamp,
+                                                                      expected = of_lamp;
   vertex_irradiance(engine, of_lamp);
   const std::vector<Float3> direct(engine.direct_irradiance().begin(),
                                    engine.direct_irradiance().end());
   engine.relight(direct);
   vertex_irradiance(engine, even);
   EXPECT_NE(even, of_lamp);
-  reconstruct_at_vertices(room()->mesh, engine.indirect_irradiance(), expected);
-  ReceiverProducts(room()->receiver_rows, room()->patches.area)
+  reconstruct_at_vertices(room_of_parts()->mesh, engine.indirect_irradiance(), expected);
+  ReceiverProducts(room_of_parts()->receiver_rows, room_of_parts()->patches.area)
       .add(engine.radiosity(), {}, expected);
   clamp_light(expected);
   EXPECT_EQ(even, expected);
 }
 
 TEST(ReceiverRows, AnEngineWithFewerPointsThanPartsIsRefused) {
-  test::expect_error([] { Engine(room(), {.direct_lighting = {.points_per_patch = 4}}); },
+  test::expect_error([] { Engine(room_of_parts(), {.direct_lighting = {.points_per_patch = 4}}); },
                      "4 points of a patch does not tell its 8 parts");
 }
 
 TEST(ReceiverRows, AddNothingUnderEvenLight) {
-  const ReceiverRows& rows = room()->receiver_rows;
-  ASSERT_GT(rows.group_count(), 0U);
-  const std::vector<Float3> even(room()->patches.size(), Float3{1, 1, 1});
-  std::vector<Float3> added(room()->mesh.position.size(), Float3{0, 0, 0});
-  ReceiverProducts(rows, room()->patches.area).add(even, {}, added);
-  for (const Float3& a : added) EXPECT_NEAR(a[0], 0, 1e-3);
+  for (const auto& data : {room(), room_of_parts()}) {
+    const ReceiverRows& rows = data->receiver_rows;
+    ASSERT_GT(rows.group_count(), 0U);
+    const std::vector<Float3> even(data->patches.size(), Float3{1, 1, 1});
+    std::vector<Float3> added(data->mesh.position.size(), Float3{0, 0, 0});
+    ReceiverProducts(rows, data->patches.area).add(even, {}, added);
+    for (const Float3& a : added) EXPECT_NEAR(a[0], 0, 1e-3);
+  }
 }
 
 TEST(ReceiverRows, ChangeNothingElse) {
@@ -202,8 +210,9 @@ TEST(ReceiverRows, ChangeNothingElse) {
 }
 
 TEST(ReceiverRows, AreTheSameOnAnyNumberOfThreads) {
-  const TransferData again = test::with_threads(1, [] { return build(true); });
-  const TransferData more = test::with_threads(4, [] { return build(true); });
+  const auto build_parts = [] { return build(true, 0.01, 4); };
+  const TransferData again = test::with_threads(1, build_parts);
+  const TransferData more = test::with_threads(4, build_parts);
   EXPECT_EQ(again.receiver_rows.value, more.receiver_rows.value);
   EXPECT_EQ(again.receiver_rows.scale, more.receiver_rows.scale);
   EXPECT_EQ(again.receiver_rows.vertex, more.receiver_rows.vertex);
@@ -212,15 +221,17 @@ TEST(ReceiverRows, AreTheSameOnAnyNumberOfThreads) {
 }
 
 TEST(ReceiverRows, AFrameWithThemDoesNotAllocate) {
-  Engine engine(room());
-  const Light light = lamp();
-  std::vector<Float3> shown(room()->mesh.position.size());
-  engine.relight({&light, 1}, {});
-  EXPECT_EQ(test::count_allocations([&] {
-              engine.relight({&light, 1}, {});
-              vertex_irradiance(engine, shown);
-            }),
-            0);
+  for (const auto& data : {room(), room_of_parts()}) {
+    Engine engine(data);
+    const Light light = lamp();
+    std::vector<Float3> shown(data->mesh.position.size());
+    engine.relight({&light, 1}, {});
+    EXPECT_EQ(test::count_allocations([&] {
+                engine.relight({&light, 1}, {});
+                vertex_irradiance(engine, shown);
+              }),
+              0);
+  }
 }
 
 TEST(ReceiverRows, AreOnlyStoredWhereTheyAddMoreThanTheTolerance) {
