@@ -89,6 +89,12 @@ class AccuracyBench {
     return own_.at(contestant.form)[k];
   }
 
+  /// A solution that a run goes on from.
+  struct Cut {
+    int sweeps = 0;
+    std::vector<Float3> radiosity;
+  };
+
   void begin(const Contestant& contestant, std::size_t k, Method& method) const {
     method.set_reflectance(cases_[k].reflectance);
     if (cases_[k].cold()) {
@@ -104,24 +110,36 @@ class AccuracyBench {
     std::vector<AccuracyRow> rows;
     for (std::size_t first = 0; first < cases_.size();
          first += static_cast<std::size_t>(settings_.lamp_count)) {
+      std::vector<Cut> cuts(settings_.lamp_count);
       if (!method->iterates()) {
-        rows.push_back(row(contestant, first, 0, *method));
+        rows.push_back(row(contestant, first, 0, *method, cuts));
         continue;
       }
       for (const int sweeps : settings_.sweeps) {
-        rows.push_back(row(contestant, first, sweeps, *method));
+        rows.push_back(row(contestant, first, sweeps, *method, cuts));
         if (rows.back().iteration_error < kConverged) break;
       }
     }
     return rows;
   }
 
-  /// Over the lamps of the change whose first case is `first`.
-  AccuracyRow row(std::size_t contestant, std::size_t first, int sweeps, Method& method) const {
+  /// Finds the solution of a case after `sweeps`, from the last cut.
+  void run(std::size_t contestant, std::size_t k, int sweeps, Method& method, Cut& cut) const {
+    begin(contestants_[contestant], k, method);
+    if (cut.sweeps > 0) method.start_from(cut.radiosity);
+    method.run(cases_[k].after, sweeps - cut.sweeps);
+    const int period = contestants_[contestant].sweeps_of_cuts();
+    if (period == 0 || sweeps % period != 0) return;
+    cut.sweeps = sweeps;
+    cut.radiosity.assign(method.radiosity().begin(), method.radiosity().end());
+  }
+
+  /// Over the lamps of the change whose first case is `first`; `cuts` are theirs.
+  AccuracyRow row(std::size_t contestant, std::size_t first, int sweeps, Method& method,
+                  std::vector<Cut>& cuts) const {
     AccuracyRow result{.contestant = contestant, .change = cases_[first].change, .sweeps = sweeps};
     for (std::size_t k = first; k < first + settings_.lamp_count; ++k) {
-      begin(contestants_[contestant], k, method);
-      method.run(cases_[k].after, sweeps);
+      run(contestant, k, sweeps, method, cuts[k - first]);
       const auto error = [&](const std::vector<Float3>& truth) {
         return reflected_error(method.radiosity(), truth, cases_[k].after,
                                contenders_.data->patches.area);

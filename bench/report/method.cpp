@@ -158,6 +158,12 @@ std::unique_ptr<Method> Contestant::make(const Contenders& contenders) const {
       make_solver(method, *contenders.form(form), {patches.area, patches.reflectance}, stored));
 }
 
+int Contestant::sweeps_of_cuts() const {
+  if (product) return 0;
+  if (method == SolveMethod::kSymmetricGaussSeidel) return 2;  // there and back
+  return method == SolveMethod::kGaussSeidel || method == SolveMethod::kGathering ? 1 : 0;
+}
+
 std::vector<Contestant> list_contestants(const Contenders& contenders,
                                          const ReportSettings& settings) {
   std::vector<Contestant> list;

@@ -47,6 +47,10 @@ struct Contestant {
   bool product = false;
 
   std::unique_ptr<Method> make(const Contenders& contenders) const;
+
+  /// A run may be cut after a multiple of so many sweeps, and goes on from the solution there as if
+  /// it had not been; 0: it may not.
+  int sweeps_of_cuts() const;
 };
 
 /// Every method on every form that it can use.

@@ -23,16 +23,18 @@ void ReportSettings::make_large() {
   motions = {0.001, 0.01, 0.05};
   sweeps = {1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 16, 24};
   repeats = 5;
+  frame_count = 120;
 }
 
 void ReportSettings::make_huge() {
-  tolerances = {0.0003, 0.001, 0.002, kDefaultTolerance, 0.02};
+  tolerances = {0.0003, 0.001, 0.002, kDefaultTolerance};
+  refined_tolerances = {kDefaultTolerance};
   lamp_count = 16;
   motions = {0.01};
   sweeps = {1, 2, 3, 4, 6, 8, 10, 12, 16};
   repeats = 3;
-  frame_count = 90;
-  truth_probe_rays = 16;
+  frame_count = 60;
+  truth = false;
 }
 
 }  // namespace rebounce::bench

@@ -1,5 +1,6 @@
 #include "precompute/build/build_decisions.h"
 
+#include "precompute/base/ranks.h"
 #include "precompute/build/build_estimate.h"
 #include "precompute/build/operator_stage.h"
 #include "precompute/exchange/links/links.h"
@@ -39,6 +40,9 @@ BuildSettings decide(BuildSettings settings, const PatchModel& model) {
   }
   if (settings.receiver_rows.at_vertices && settings.operator_kind == OperatorKind::kNoOperator) {
     throw Error("rows of vertices need an operator; ask for one, or for receivers at patches");
+  }
+  if (!links && !Ranks().alone()) {
+    throw Error("the ranks of mpirun share builds from links alone; add --form-factors links");
   }
   if (!settings.precision) {
     const bool dense = settings.operator_kind == OperatorKind::kDense;

@@ -13,6 +13,7 @@
 #include "precompute/lights/fitting_lights.h"
 #include "precompute/lights/measured_error.h"
 #include "precompute/lights/reference_solution.h"
+#include "precompute/lights/solve_batches.h"
 #include "precompute/lights/whole_error.h"
 #include "rebounce/error.h"
 #include "transfer/base/area_norm.h"
@@ -38,21 +39,13 @@ using Exitances = std::span<const std::vector<Float3>>;
 /// The radiosities of initial exitances. Throws Cancelled if asked to stop.
 Lights radiosities_of(const ReferenceSolver& solver, Exitances exitances,
                       const Progress& progress) {
-  Lights radiosities;
-  while (radiosities.size() < exitances.size()) {
-    if (progress && !progress(static_cast<double>(radiosities.size()) / exitances.size())) {
-      throw Cancelled();
-    }
-    const Exitances left = exitances.subspan(radiosities.size());
-    const auto some = left.first(std::min<std::size_t>(left.size(), ReferenceSolver::kBatchLights));
+  return solve_batches(exitances, progress, [&](Exitances some) {
+    Lights radiosities;
     for (const auto& solution : solver.radiosities(some, kFittingResidual)) {
-      std::vector<Float3>& radiosity = radiosities.emplace_back();
-      for (const auto& [r, g, b] : solution) {
-        radiosity.push_back({static_cast<float>(r), static_cast<float>(g), static_cast<float>(b)});
-      }
+      radiosities.push_back(rounded(solution));
     }
-  }
-  return radiosities;
+    return radiosities;
+  });
 }
 
 /// The training, validation and test lights of the compressions.

@@ -10,6 +10,7 @@
 #include "precompute/build/transfer_build.h"
 #include "precompute/cli/commands.h"
 #include "precompute/cli/info_json.h"
+#include "precompute/cli/mpi_ranks.h"
 #include "precompute/cli/output_check.h"
 #include "precompute/cli/web_file.h"
 #include "precompute/lights/validation_error.h"
@@ -166,7 +167,7 @@ std::vector<std::string> names_of(const auto& table) {
   return names;
 }
 
-void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
+BuildSettings settings_of(const PrecomputeOptions& chosen) {
   BuildSettings settings = chosen.settings;
   parse_probes(chosen.probes, settings.probes);
   settings.receivers = split_lists(chosen.receivers);
@@ -182,16 +183,39 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   settings.receiver_rows.at_vertices = chosen.receivers_at == "vertices";
   settings.memory_limit_bytes =
       static_cast<std::uint64_t>(chosen.memory_limit_gib * static_cast<double>(1ULL << 30));
+  return settings;
+}
+
+TransferData build(const PrecomputeOptions& chosen, const CommonOptions& options,
+                   BuildReport& report) {
+  const BuildSettings settings = settings_of(chosen);
   check_can_write(chosen.output);
-  BuildReport report;
-  TransferData data;
-  {
-    ProgressBar bar(!options.quiet);
-    data = build_transfer_data(
-        chosen.scene, settings, report,
-        [&](std::string_view phase, double fraction) { return bar.update(phase, fraction); },
-        [&](const CostEstimate& estimate) { print_note(options, described(estimate)); });
+  ProgressBar bar(!options.quiet);
+  return build_transfer_data(
+      chosen.scene, settings, report,
+      [&](std::string_view phase, double fraction) { return bar.update(phase, fraction); },
+      [&](const CostEstimate& estimate) { print_note(options, described(estimate)); });
+}
+
+/// The same by all ranks together, all of which get the data. Rank 0 speaks for them.
+TransferData build_by_ranks(MpiRanks& ranks, const PrecomputeOptions& chosen,
+                            const CommonOptions& options, BuildReport& report) {
+  CommonOptions of_rank = options;
+  if (ranks.rank() != 0) of_rank.quiet = true;
+  const CommunicatorScope scope(&ranks);
+  try {
+    return build(chosen, of_rank, report);
+  } catch (const std::exception& error) {
+    end_all(ranks, error);
   }
+}
+
+void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
+  const std::unique_ptr<MpiRanks> ranks = join_ranks();
+  BuildReport report;
+  const TransferData data =
+      ranks ? build_by_ranks(*ranks, chosen, options, report) : build(chosen, options, report);
+  if (ranks && ranks->rank() != 0) return;
   for (const std::string& warning : report.warnings) print_note(options, "warning: " + warning);
   std::uint64_t file_bytes = 0;
   if (chosen.reader == "web") {

@@ -91,6 +91,18 @@ void BlockCheckpoint::keep(const std::string& name, const BlockPart& part) const
 
 std::optional<BlockPart> BlockCheckpoint::find(const std::string& name) const {
   if (!keeps()) return std::nullopt;
+  const Ranks ranks;
+  std::optional<BlockPart> part;
+  if (ranks.rank() == 0) part = read(name);
+  std::uint8_t found = part ? 1 : 0;
+  ranks.share(std::span(&found, 1));
+  if (found == 0) return std::nullopt;
+  if (!part) part.emplace();
+  share(ranks, std::span(&*part, 1));
+  return part;
+}
+
+std::optional<BlockPart> BlockCheckpoint::read(const std::string& name) const {
   std::ifstream in(folder_ / name, std::ios::binary);
   Header header;
   if (!in || !read_into(in, std::span(&header, 1))) return std::nullopt;

@@ -13,7 +13,8 @@ namespace rebounce {
 ///
 /// A file is written whole or not at all. It begins with a hash of its name and of the `key` that
 /// it was made for, and a hash of its content. A part that was made for another key, has another
-/// name, is damaged or is no such file counts as missing.
+/// name, is damaged or is no such file counts as missing. Rank 0 reads, and gives the others what
+/// it has found.
 class BlockCheckpoint {
  public:
   /// Keeps nothing.
@@ -30,19 +31,22 @@ class BlockCheckpoint {
   /// be written.
   void keep(const std::string& name, const BlockPart& part) const;
 
-  /// The part called `name`, if it is there.
+  /// The part called `name`, if it is there. All ranks call it.
   std::optional<BlockPart> find(const std::string& name) const;
 
-  /// The part called `name` if it is there; otherwise makes it with `make` and keeps it.
+  /// The part called `name` if it is there; otherwise makes it with `make`, and rank 0 keeps it.
+  /// All ranks call it.
   template <typename Make>
   BlockPart find_or_make(const std::string& name, const Make& make) const {
     if (std::optional<BlockPart> found = find(name)) return std::move(*found);
     BlockPart part = make();
-    keep(name, part);
+    if (Ranks().rank() == 0) keep(name, part);
     return part;
   }
 
  private:
+  std::optional<BlockPart> read(const std::string& name) const;
+
   std::filesystem::path folder_;
   std::string key_;
 };

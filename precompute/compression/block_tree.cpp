@@ -251,6 +251,24 @@ void BlockPart::append(BlockPart&& other) {
   cost += other.cost;
 }
 
+void share(const Ranks& ranks, std::span<BlockPart> parts) {
+  if (ranks.alone()) return;
+  std::vector<std::vector<TransferBlock>> blocks;
+  std::vector<std::vector<float>> values;
+  std::vector<double> costs;
+  for (BlockPart& part : parts) {
+    blocks.push_back(std::move(part.blocks));
+    values.push_back(std::move(part.values));
+    costs.push_back(part.cost);
+  }
+  ranks.share(std::span(blocks));
+  ranks.share(std::span(values));
+  ranks.share(std::span(costs));
+  for (std::size_t k = 0; k < parts.size(); ++k) {
+    parts[k] = {std::move(blocks[k]), std::move(values[k]), costs[k]};
+  }
+}
+
 std::uint32_t largest_piece(std::uint32_t position_count) {
   return std::clamp(position_count / 8, kSmallestPiece, kLargestPiece);
 }
@@ -268,11 +286,12 @@ std::vector<BlockPiece> BlockTreeCompressor::pieces() const {
 BlockPart BlockTreeCompressor::compress(std::span<const BlockPiece> pieces, double multiplier,
                                         const Progress& progress) const {
   load_blas();
+  const Ranks ranks;
   std::vector<BlockPart> parts(pieces.size());
   ParallelProgress loop(progress, pieces.size());
 #pragma omp parallel for schedule(dynamic, 1)
   for (std::size_t k = 0; k < pieces.size(); ++k) {
-    if (loop.stopped()) continue;
+    if (loop.stopped() || !ranks.makes(k)) continue;
     if (wants(pieces[k])) {
       parts[k] =
           PieceCompressor(matrix_, tree_, weights_, wanted_, sizes_, multiplier, pieces[k], loop)
@@ -281,6 +300,7 @@ BlockPart BlockTreeCompressor::compress(std::span<const BlockPiece> pieces, doub
     loop.advance();
   }
   loop.finish();
+  share(ranks, parts);
   BlockPart whole;
   for (BlockPart& part : parts) whole.append(std::move(part));
   return whole;

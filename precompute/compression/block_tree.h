@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "precompute/base/progress.h"
+#include "precompute/base/ranks.h"
 #include "precompute/base/symmetric_matrix.h"
 #include "precompute/compression/block_compression.h"
 #include "precompute/compression/light_weights.h"
@@ -27,6 +28,9 @@ struct BlockPart {
 
   void append(BlockPart&& other);
 };
+
+/// Gives all ranks the parts that each has made, part by part in turns.
+void share(const Ranks& ranks, std::span<BlockPart> parts);
 
 /// The side of a piece for a number of positions: at most 2048, and at most an eighth of the
 /// positions where possible, so that there are enough pieces to share among threads.
@@ -59,8 +63,8 @@ class BlockTreeCompressor {
   /// True if any entry of a piece is wanted.
   bool wants(const BlockPiece& piece) const { return wanted_.wanted(piece.row, piece.column); }
 
-  /// Compresses pieces of the operator (f32) at a multiplier > 0. Throws Cancelled if asked to
-  /// stop.
+  /// Compresses pieces of the operator (f32) at a multiplier > 0. Ranks share them. Throws
+  /// Cancelled if asked to stop.
   BlockPart compress(std::span<const BlockPiece> pieces, double multiplier,
                      const Progress& progress = {}) const;
 

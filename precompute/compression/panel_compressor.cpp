@@ -19,7 +19,6 @@ PanelCompressor::PanelCompressor(PanelMatrix& matrix, const PatchTable& patches,
                                  std::size_t panels_together, const BlockCheckpoint& checkpoint)
     : matrix_(matrix),
       multiplier_(multiplier),
-      panels_together_(panels_together),
       checkpoint_(checkpoint),
       frame_(compression_frame(matrix, patches, training)),
       weights_(frame_.weights()),
@@ -27,6 +26,7 @@ PanelCompressor::PanelCompressor(PanelMatrix& matrix, const PatchTable& patches,
   multiplier_ = frame_.multiplier_for(multiplier);
   make_panels();
   for (Panel& panel : panels_) panel.part = checkpoint_.find(panel.name);
+  list_runs(Ranks().least(panels_together));
 }
 
 void PanelCompressor::make_panels() {
@@ -46,6 +46,25 @@ void PanelCompressor::make_panels() {
   }
 }
 
+void PanelCompressor::list_runs(std::size_t panels_together) {
+  for (std::size_t first = 0; first < panels_.size(); ++first) {
+    std::size_t end = first;
+    while (end < panels_.size() && end - first < panels_together && !panels_[end].part) ++end;
+    if (end == first) continue;
+    runs_.push_back(std::span(panels_).subspan(first, end - first));
+    first = end - 1;
+  }
+}
+
+double PanelCompressor::work() const {
+  const Ranks ranks;
+  double work = 0;
+  for (std::size_t k = 0; k < runs_.size(); ++k) {
+    if (ranks.makes(k)) work += work_of(runs_[k]);
+  }
+  return work;
+}
+
 double PanelCompressor::compression_work(const Panel& panel) const {
   return kCompression * static_cast<double>(panel.pieces.size()) / static_cast<double>(all_pieces_);
 }
@@ -60,21 +79,34 @@ double PanelCompressor::work_of(std::span<const Panel> panels) const {
 }
 
 HierarchicalStorage PanelCompressor::run(const Progress& progress) {
+  const Ranks ranks;
   const double all = work();
-  for (std::size_t first = 0; first < panels_.size(); ++first) {
-    std::size_t end = first;
-    while (end < panels_.size() && end - first < panels_together_ && !panels_[end].part) ++end;
-    if (end == first) continue;
-    const auto some = std::span(panels_).subspan(first, end - first);
+  for (std::size_t k = 0; k < runs_.size(); ++k) {
+    if (!ranks.makes(k)) continue;
     const double before = all - work();
-    run(some, part_of(progress, before / all, (before + work_of(some)) / all));
+    const CommunicatorScope alone(nullptr);
+    run(runs_[k], part_of(progress, before / all, (before + work_of(runs_[k])) / all));
   }
+  share_runs();
   BlockPart whole;
   for (Panel& panel : panels_) {
     whole.append(std::move(*panel.part));
     panel.part.reset();
   }
   return compressor_.assemble(std::move(whole));
+}
+
+/// Gives all ranks the panels that each has made: those of a run in its first panel.
+void PanelCompressor::share_runs() {
+  std::vector<BlockPart> parts(runs_.size());
+  for (std::size_t k = 0; k < runs_.size(); ++k) {
+    for (Panel& panel : runs_[k]) {
+      if (panel.part) parts[k].append(std::move(*panel.part));
+      panel.part.emplace();
+    }
+  }
+  share(Ranks(), parts);
+  for (std::size_t k = 0; k < runs_.size(); ++k) runs_[k].front().part = std::move(parts[k]);
 }
 
 void PanelCompressor::run(std::span<Panel> panels, const Progress& progress) {

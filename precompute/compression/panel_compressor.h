@@ -25,15 +25,16 @@ class PanelCompressor {
 
   /// Prepares the cluster tree and the weights, and finds the panels that `checkpoint` holds.
   /// `matrix` and `checkpoint` must outlive the object. The columns of `panels_together` panels, >
-  /// 0, are in memory at the same time; the bits do not depend on it.
+  /// 0, are in memory at the same time; the bits do not depend on it. Ranks take runs of so many
+  /// panels in turns.
   PanelCompressor(PanelMatrix& matrix, const PatchTable& patches,
                   std::span<const std::vector<Float3>> training, double multiplier,
                   std::size_t panels_together, const BlockCheckpoint& checkpoint);
   PanelCompressor(const PanelCompressor&) = delete;
   PanelCompressor& operator=(const PanelCompressor&) = delete;
 
-  /// The remaining work, in columns that are solved for.
-  double work() const { return work_of(panels_); }
+  /// The remaining work of this rank, in columns that are solved for.
+  double work() const;
 
   /// Does the work and keeps every panel in the checkpoint. Call it once. Throws Cancelled if asked
   /// to stop.
@@ -49,18 +50,21 @@ class PanelCompressor {
   };
 
   void make_panels();
+  void list_runs(std::size_t panels_together);
   double compression_work(const Panel& panel) const;
   double work_of(std::span<const Panel> panels) const;  ///< of the panels that are not done
   void run(std::span<Panel> panels, const Progress& progress);
+  void share_runs();
 
   PanelMatrix& matrix_;
   double multiplier_;
-  std::size_t panels_together_;
   const BlockCheckpoint& checkpoint_;
   CompressionFrame frame_;
   std::vector<ClusterWeight> weights_;
   BlockTreeCompressor compressor_;
-  std::vector<Panel> panels_;   ///< ordered by their first columns
+  std::vector<Panel> panels_;  ///< ordered by their first columns
+  /// Neighbouring panels that are not done at the beginning, which are in memory at the same time.
+  std::vector<std::span<Panel>> runs_;
   std::size_t all_pieces_ = 0;  ///< of all panels, including unwanted ones
 };
 

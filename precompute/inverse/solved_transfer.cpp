@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "precompute/base/blas.h"
+#include "precompute/base/ranks.h"
 #include "precompute/inverse/dense_transfer.h"
 #include "rebounce/error.h"
 
@@ -38,6 +39,12 @@ constexpr Index kSmallGroup = 16;
 // Random vectors for the energies. Their relative errors are sqrt(2 / 128) = 13 %; those of their
 // roots, which light_weights.cpp uses, are 6 %.
 constexpr Index kProbeCount = 128;
+
+/// Gives all ranks the groups of columns that each has made, in turns.
+void share_groups(const Ranks& ranks, MatrixXf& columns) {
+  const auto run = static_cast<std::size_t>(kSmallGroup * columns.rows());
+  ranks.share(std::span(columns.data(), static_cast<std::size_t>(columns.size())), run);
+}
 
 /// Sums of `term(first, count)`, an expression [count][k], over all rows.
 template <typename Term>
@@ -91,15 +98,18 @@ SolvedTransfer::SolvedTransfer(const HierarchicalOperator& form_factors,
 
 Vectors SolvedTransfer::gather(const Vectors& x) const {
   load_blas();
-  Vectors result(x.rows(), x.cols());
+  const Ranks ranks;
+  MatrixXf result(x.rows(), x.cols());
 #pragma omp parallel for schedule(dynamic, 1)
   for (Index begin = 0; begin < x.cols(); begin += kSmallGroup) {
+    if (!ranks.makes(static_cast<std::size_t>(begin / kSmallGroup))) continue;
     const Index width = std::min(kSmallGroup, x.cols() - begin);
     Vectors out;
     HierarchicalMatrix::Workspace workspace;
     form_factors_.multiply(0, x.middleCols(begin, width), out, workspace);
     result.middleCols(begin, width) = out;
   }
+  share_groups(ranks, result);
   return result;
 }
 
@@ -187,10 +197,12 @@ const Vectors& SolvedTransfer::columns(std::uint32_t matrix, std::span<const std
 
 MatrixXf SolvedTransfer::multiply(std::uint32_t matrix, const MatrixXf& x) const {
   load_blas();
+  const Ranks ranks;
   MatrixXf result(x.rows(), x.cols());
   std::exception_ptr failure;
 #pragma omp parallel for schedule(dynamic, 1)
   for (Index begin = 0; begin < x.cols(); begin += kSmallGroup) {
+    if (!ranks.makes(static_cast<std::size_t>(begin / kSmallGroup))) continue;
     const Index width = std::min(kSmallGroup, x.cols() - begin);
     Vectors in = Vectors::Zero(position_count(), width);
     Workspace workspace;
@@ -209,6 +221,7 @@ MatrixXf SolvedTransfer::multiply(std::uint32_t matrix, const MatrixXf& x) const
     }
   }
   if (failure) std::rethrow_exception(failure);
+  share_groups(ranks, result);
   return result;
 }
 

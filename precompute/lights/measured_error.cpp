@@ -4,10 +4,12 @@
 #include <functional>
 #include <numeric>
 
+#include "precompute/base/ranks.h"
 #include "precompute/lights/error_bound.h"
 #include "precompute/lights/error_reference.h"
 #include "precompute/lights/reference_lighting.h"
 #include "precompute/lights/reference_solution.h"
+#include "precompute/lights/solve_batches.h"
 #include "rebounce/error.h"
 #include "transfer/base/area_norm.h"
 #include "transfer/base/parallel.h"
@@ -69,11 +71,11 @@ std::vector<LightError> light_errors(const TransferData& data,
   ErrorReference received;
   std::vector<std::vector<Float3>> arrived, results;
   std::vector<LightError> errors;
-  for (std::size_t done = 0; done < lights.size(); done += ReferenceSolver::kBatchLights) {
-    if (progress && !progress(static_cast<double>(done) / lights.size())) throw Cancelled();
-    const auto some = lights.subspan(
-        done, std::min<std::size_t>(lights.size() - done, ReferenceSolver::kBatchLights));
-    auto truths = truth_of(some);
+  const std::size_t together = Ranks().count() * ReferenceSolver::kBatchLights;
+  for (std::size_t done = 0; done < lights.size(); done += together) {
+    report_progress(progress, static_cast<double>(done) / lights.size());
+    const auto some = lights.subspan(done, std::min(lights.size() - done, together));
+    auto truths = solve_batches(some, {}, truth_of);
     for (std::size_t k = 0; k < some.size(); ++k) {
       if (arrives_nowhere(truths[k], some[k], area)) continue;
       data.transfer->apply(some[k], indirect_irradiance, workspace);

@@ -5,8 +5,10 @@
 #include <utility>
 
 #include "precompute/base/parallel_progress.h"
+#include "precompute/base/ranks.h"
 #include "precompute/exchange/pairs/escape.h"
 #include "precompute/exchange/pairs/hemisphere_exchange.h"
+#include "precompute/lights/solve_batches.h"
 #include "runtime/rays/patch_points.h"
 #include "runtime/rays/sampling.h"
 #include "transfer/base/area_norm.h"
@@ -27,8 +29,10 @@ constexpr double kStudent = 3.182;
 // Rays of a group, and of a patch of it at most (lab/111).
 constexpr std::size_t kRaysOfGroup = 1 << 23, kMostRays = 4096;
 
-// The lights whose errors are spread together, as many as are solved for together.
-constexpr std::size_t kLightsAtOnce = ReferenceSolver::kBatchLights / kGroups;
+/// Lights whose groups are spread together: a batch for each rank.
+std::size_t lights_at_once() {
+  return Ranks().count() * ReferenceSolver::kBatchLights / kGroups;
+}
 
 // Rays take this part of the time of an estimate.
 constexpr double kTracingPart = 0.7;
@@ -169,6 +173,7 @@ void WholeErrorEstimator::trace(std::span<const std::uint32_t> shown_patch, cons
   }
   const PatchTriangles triangles(data_.mesh.triangle_patch, n);
   const std::size_t rows = patch_[0].size();
+  const Ranks ranks;
   ParallelProgress loop(progress, kGroups * rows);
 #pragma omp parallel
   {
@@ -177,8 +182,8 @@ void WholeErrorEstimator::trace(std::span<const std::uint32_t> shown_patch, cons
     std::vector<Float3> sum;
 #pragma omp for schedule(dynamic, 16)
     for (std::size_t k = 0; k < kGroups * rows; ++k) {
-      if (loop.stopped()) continue;
       const std::size_t group = k / rows, row = k % rows;
+      if (loop.stopped() || !ranks.makes(row)) continue;
       const std::uint32_t i = patch_[group][row];
       measure_escape(data_.mesh, shown_patch, triangles[i], i, tracer, ray_count_,
                      mix_bits(seed_ + kGroups + group), scratch);
@@ -192,6 +197,7 @@ void WholeErrorEstimator::trace(std::span<const std::uint32_t> shown_patch, cons
     }
   }
   loop.finish();
+  for (auto& of_group : residual_) ranks.share(std::span(of_group));
 }
 
 /// What a group says of the residual, 0 at patches that are not in it.
@@ -218,7 +224,9 @@ void WholeErrorEstimator::spread(const ReferenceSolver& reference, std::size_t f
     }
   }
   const auto transferred =
-      reference.indirect_irradiances(reflected, kSpreadResidual, kSpreadResidual);
+      solve_batches(reflected, {}, [&](std::span<const std::vector<Float3>> some) {
+        return reference.indirect_irradiances(some, kSpreadResidual, kSpreadResidual);
+      });
   for (std::size_t k = 0; k < missing_.size(); ++k) {
     add_to(missing_[k], transferred[k]);
     roles_.keep(PatchRoles::kReceiver, missing_[k]);
@@ -226,7 +234,7 @@ void WholeErrorEstimator::spread(const ReferenceSolver& reference, std::size_t f
 }
 
 WholeErrorEstimator::Products WholeErrorEstimator::products(std::size_t light) const {
-  const auto missing = std::span(missing_).subspan(light % kLightsAtOnce * kGroups, kGroups);
+  const auto missing = std::span(missing_).subspan(light % lights_at_once() * kGroups, kGroups);
   const std::vector<float>& area = data_.patches.area;
   const std::vector<Float3>& compression = compression_[light];
   Products result;
@@ -249,9 +257,9 @@ WholeError WholeErrorEstimator::estimate(std::span<const std::uint32_t> shown_pa
   trace(shown_patch, tracer, part_of(progress, 0, kTracingPart));
   std::vector<Replicates> of_links, of_whole;
   for (std::size_t l = 0; l < lights; ++l) {
-    if (l % kLightsAtOnce == 0) {
+    if (l % lights_at_once() == 0) {
       report_progress(progress, kTracingPart + (1 - kTracingPart) * l / lights);
-      spread(reference, l, std::min(kLightsAtOnce, lights - l));
+      spread(reference, l, std::min(lights_at_once(), lights - l));
     }
     const Products p = products(l);
     of_links.push_back(

@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -36,6 +37,28 @@ Matrix3d inverse_without_flat(const Matrix3d& covariance) {
 }
 
 }  // namespace
+
+void share(const Ranks& ranks, std::span<std::vector<AffineLink>> lists) {
+  if (ranks.alone()) return;
+  struct Plain {
+    std::uint32_t a, b;
+    std::array<double, 7> values;
+  };
+  std::vector<std::vector<Plain>> plain(lists.size());
+  for (std::size_t k = 0; k < lists.size(); ++k) {
+    for (const AffineLink& link : lists[k]) {
+      const Vector3d &g = link.gradient_a, &h = link.gradient_b;
+      plain[k].push_back({link.a, link.b, {link.exchange, g[0], g[1], g[2], h[0], h[1], h[2]}});
+    }
+  }
+  ranks.share(std::span(plain));
+  for (std::size_t k = 0; k < lists.size(); ++k) {
+    lists[k].clear();
+    for (const auto& [a, b, v] : plain[k]) {
+      lists[k].push_back({a, b, v[0], {v[1], v[2], v[3]}, {v[4], v[5], v[6]}});
+    }
+  }
+}
 
 std::vector<NodeSpread> spread_nodes(const FormFactorLinks& links, std::span<const float> area,
                                      std::span<const Float3> centroid) {

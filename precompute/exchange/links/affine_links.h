@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "precompute/base/ranks.h"
 #include "transfer/exchange/linked_form_factors.h"
 
 namespace rebounce {
@@ -34,6 +35,9 @@ struct AffineLink {
 
 /// The squared Frobenius norm of the part of A^1/2 F A^-1/2 that `link` stands for.
 double squared_norm(const AffineLink& link, const NodeSpread& a, const NodeSpread& b);
+
+/// Gives all ranks the lists of links that each has made, list by list in turns.
+void share(const Ranks& ranks, std::span<std::vector<AffineLink>> lists);
 
 void append_link(const AffineLink& link, FormFactorLinks& links);
 

@@ -43,6 +43,7 @@ void LeafLinks::count(std::uint32_t i, std::span<const MetPatch> met) {
 
 std::uint64_t LeafLinks::measure(const PatchGeometry& geometry, const PairExchange& exchange,
                                  int probe_rays, const Progress& progress) {
+  const Ranks ranks;
   const std::size_t rows = begin_.size() - 1;
   ParallelProgress loop(progress, rows);
   std::uint64_t rays = 0;
@@ -51,14 +52,27 @@ std::uint64_t LeafLinks::measure(const PatchGeometry& geometry, const PairExchan
     Scratch scratch;
 #pragma omp for schedule(dynamic, 4)
     for (std::size_t i = 0; i < rows; ++i) {
-      if (loop.stopped()) continue;
+      if (loop.stopped() || !ranks.makes(i)) continue;
       measure_row(static_cast<std::uint32_t>(i), geometry, exchange, probe_rays, scratch);
       loop.advance();
     }
     rays += scratch.pairs.ray_count;
   }
   loop.finish();
+  share_areas(ranks);
+  ranks.add_up(std::span(&rays, 1));
   return rays;
+}
+
+/// Gives all ranks the exchange areas of the rows that each has measured.
+void LeafLinks::share_areas(const Ranks& ranks) {
+  if (ranks.alone()) return;
+  std::vector<decltype(Link::exchange_area)> area(pairs_.size(), 0);
+  for (std::size_t k = 0; k < pairs_.size(); ++k) {
+    if (ranks.makes(pairs_[k].row)) area[k] = links_[pairs_[k].link].exchange_area;
+  }
+  ranks.add_up(std::span(area));
+  for (std::size_t k = 0; k < pairs_.size(); ++k) links_[pairs_[k].link].exchange_area = area[k];
 }
 
 void LeafLinks::measure_row(std::uint32_t i, const PatchGeometry& geometry,

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "precompute/base/progress.h"
+#include "precompute/base/ranks.h"
 #include "precompute/exchange/links/link_refinement.h"
 #include "precompute/exchange/links/link_tree.h"
 #include "precompute/exchange/pairs/hemisphere_exchange.h"
@@ -25,6 +26,9 @@ class LeafLinks {
   /// Counts what the hemisphere rays of patch i met, ascending. Several threads may count at once.
   void count(std::uint32_t i, std::span<const MetPatch> met);
 
+  /// Adds up what the ranks have counted.
+  void add_up_counts(const Ranks& ranks) { ranks.add_up(std::span(count_)); }
+
   /// Writes the exchange areas to the links, once all patches are counted. Each pair gets
   /// `probe_rays` at first. Returns the number of rays. Throws Cancelled if `progress` asks to
   /// stop.
@@ -43,6 +47,7 @@ class LeafLinks {
   }
   void measure_row(std::uint32_t i, const PatchGeometry& geometry, const PairExchange& exchange,
                    int probe_rays, Scratch& scratch);
+  void share_areas(const Ranks& ranks);
 
   std::span<Link> links_;
   std::vector<Pair> pairs_;           ///< ascending by row and column

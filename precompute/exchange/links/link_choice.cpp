@@ -5,6 +5,7 @@
 #include <span>
 
 #include "precompute/base/parallel_progress.h"
+#include "precompute/base/ranks.h"
 
 namespace rebounce {
 namespace {
@@ -209,18 +210,20 @@ std::vector<std::vector<AffineLink>> choose_links(const SpreadTree& tree, const 
   append_blocks(tree.tree, 0, 0, blocks);
   std::vector<std::vector<AffineLink>> links(blocks.size() + 1);
   links[blocks.size()] = links_to_themselves(tree, pairs);
+  const Ranks ranks;
   ParallelProgress finished(progress, blocks.size());
 #pragma omp parallel
   {
     BlockFitting fitting(tree, pairs, patches, multiplier);
 #pragma omp for schedule(dynamic, 1)
     for (std::size_t k = 0; k < blocks.size(); ++k) {
-      if (finished.stopped()) continue;
+      if (finished.stopped() || !ranks.makes(k)) continue;
       links[k] = fitting.fit(blocks[k]);
       finished.advance();
     }
   }
   finished.finish();
+  share(ranks, std::span(links).first(blocks.size()));
   return links;
 }
 

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cmath>
 
+#include "precompute/base/ranks.h"
 #include "rebounce/error.h"
 #include "runtime/rays/float3_glm.h"
 
@@ -14,6 +15,9 @@ namespace {
 
 // The points of a plane are off it by less than this fraction of its size.
 constexpr double kPlane = 1e-7;
+
+// Pairs of a generation that one rank decides before the next rank's turn.
+constexpr std::size_t kPairsInTurn = 64;
 
 // A pair that faces in part may get a link if all of it is below this fraction of the allowed
 // error.
@@ -76,6 +80,7 @@ void LinkRefinement::refine(std::vector<Candidate> generation, const Progress& p
 
 void LinkRefinement::decide(const std::vector<Candidate>& generation,
                             std::vector<Outcome>& outcomes, const Progress& progress) {
+  const Ranks ranks;
   std::atomic<bool> stop = false;
   std::uint64_t rays = 0;
 #pragma omp parallel reduction(+ : rays)
@@ -83,7 +88,7 @@ void LinkRefinement::decide(const std::vector<Candidate>& generation,
     Scratch scratch{PairKernel(tree_, shadow_rays_), {}};
 #pragma omp for schedule(dynamic, 64)
     for (std::size_t k = 0; k < generation.size(); ++k) {
-      if (stop) continue;
+      if (stop || !ranks.makes(k, kPairsInTurn)) continue;
       outcomes[k] = decide(generation[k], scratch);
       const bool tells = progress && omp_get_thread_num() == 0 && k % 64 == 0;
       if (tells && !progress(std::clamp(done_, 0.0, 1.0))) stop = true;
@@ -91,6 +96,8 @@ void LinkRefinement::decide(const std::vector<Candidate>& generation,
     rays += scratch.ray_count;
   }
   if (stop) throw Cancelled();
+  ranks.share(std::span(outcomes), kPairsInTurn);
+  ranks.add_up(std::span(&rays, 1));
   ray_count_ += rays;
   candidate_count_ += generation.size();
 }

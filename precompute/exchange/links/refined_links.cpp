@@ -47,6 +47,7 @@ class LinkMeasurement {
     const std::size_t n = model_.patches.size();
     const PatchTriangles triangles(model_.mesh.triangle_patch, n);
     std::vector<Escape> escape(n);
+    const Ranks ranks;
     ParallelProgress loop(progress, n);
 #pragma omp parallel
     {
@@ -54,7 +55,7 @@ class LinkMeasurement {
       MetPatchCounter counter;
 #pragma omp for schedule(dynamic, 16)
       for (std::uint32_t i = 0; i < n; ++i) {
-        if (loop.stopped()) continue;
+        if (loop.stopped() || !ranks.makes(i)) continue;
         escape[i] = measure_escape(model_.mesh, model_.shown_patch, triangles[i], i, tracer_,
                                    settings_.hemisphere_rays, settings_.seed, scratch);
         links.count(i, counter.count(n, scratch.met));
@@ -62,6 +63,8 @@ class LinkMeasurement {
       }
     }
     loop.finish();
+    share(ranks, escape);
+    links.add_up_counts(ranks);
     ray_count_ += n * static_cast<std::uint64_t>(settings_.hemisphere_rays);
     return escape;
   }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "precompute/sampling/hemisphere_rays.h"
 #include "precompute/sampling/sobol_blocks.h"
@@ -110,10 +111,25 @@ Escape measure_escape(const DisplayMesh& mesh, std::span<const std::uint32_t> sh
   Escape escape{static_cast<double>(sky) / ray_count, static_cast<double>(absorbed) / ray_count};
   for (std::uint32_t cell = 0; sky > 0 && cell < kSkyCellCount; ++cell) {
     if (count[cell] == 0) continue;
-    escape.sky_cells.emplace_back(static_cast<std::uint8_t>(cell),
-                                  static_cast<float>(count[cell]) / static_cast<float>(ray_count));
+    escape.sky_cells.push_back({static_cast<std::uint8_t>(cell),
+                                static_cast<float>(count[cell]) / static_cast<float>(ray_count)});
   }
   return escape;
+}
+
+void share(const Ranks& ranks, std::span<Escape> escape) {
+  if (ranks.alone()) return;
+  std::vector<std::array<double, 2>> parts;
+  std::vector<std::vector<EscapeToCell>> cells;
+  for (Escape& of_patch : escape) {
+    parts.push_back({of_patch.sky, of_patch.absorbed});
+    cells.push_back(std::move(of_patch.sky_cells));
+  }
+  ranks.share(std::span(parts));
+  ranks.share(std::span(cells));
+  for (std::size_t i = 0; i < escape.size(); ++i) {
+    escape[i] = {parts[i][0], parts[i][1], std::move(cells[i])};
+  }
 }
 
 EscapedLight share_escape(std::span<const double> row_sum, std::span<const Escape> escape) {

@@ -1,0 +1,140 @@
+#!/usr/bin/env python3
+"""Builds from links by several ranks of mpirun, undisturbed and with ranks killed.
+
+Any number of ranks gives the bytes of one process. A rank that is killed ends the run with an exit
+status that is not 0 and without half a file, and the same command with another number of ranks goes
+on from the checkpoint, to the same bytes.
+
+Usage: ranks.py PROGRAM WORK [--moments N] [--most RANKS] [--seed S]
+"""
+
+import argparse
+import os
+import pathlib
+import random
+import subprocess
+import sys
+import time
+
+import kills
+
+# Root may, more ranks than processors may, and no other machine is looked for.
+ENVIRONMENT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+               "OMPI_MCA_plm": "isolated", "OMPI_MCA_rmaps_base_oversubscribe": "1",
+               "OMPI_MCA_btl_vader_single_copy_mechanism": "none", "OMP_NUM_THREADS": "1"}
+COMMAND = kills.precompute("precompute", "--patches", "80", "--form-factors", "links",
+                           "--tolerance", "0.05", "--checkpoint", "OUT/parts", folders=["parts"])
+
+
+def line(count, program, folder):
+    return ["mpirun", "-n", str(count), *COMMAND.line(program, folder), "--quiet"]
+
+
+def begin(count, program, folder):
+    return subprocess.Popen(line(count, program, folder), env=os.environ | ENVIRONMENT,
+                            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                            stderr=subprocess.PIPE)
+
+
+def run(count, program, folder):
+    process = begin(count, program, folder)
+    text = process.communicate(timeout=300)[1].decode()
+    kills.require(process.returncode == 0, f"{count} ranks: {text}")
+
+
+def rank_of(pid):
+    """The rank of a process of mpirun's; None of any other."""
+    try:
+        entries = pathlib.Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
+    except OSError:
+        return None
+    name = b"OMPI_COMM_WORLD_RANK="
+    return next((int(e[len(name):]) for e in entries if e.startswith(name)), None)
+
+
+def find_rank(process, rank):
+    """The process of a rank as soon as there is one; None if the run ends before."""
+    while process.poll() is None:
+        children = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children")
+        for pid in children.read_text().split():
+            if rank_of(pid) == rank:
+                return int(pid)
+        time.sleep(0.005)
+    return None
+
+
+def used(pid):
+    """Processor seconds of a process, all its threads; None if it has ended."""
+    try:
+        fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    except OSError:
+        return None
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def kill_rank(process, rank, moment):
+    """Kills a rank when it has used so many processor seconds. False if it has ended before."""
+    pid = find_rank(process, rank)
+    while pid is not None and process.poll() is None:
+        seconds = used(pid)
+        if seconds is None:
+            return False
+        if seconds >= moment:
+            os.kill(pid, 9)
+            return True
+        time.sleep(0.002)
+    return False
+
+
+def kill_and_go_on(program, folder, known, draw, most, moment):
+    """Returns whether the rank was killed before its end."""
+    count, again = draw.sample(range(1, most + 1), 2)
+    rank = draw.randrange(count)
+    kills.fresh(folder, COMMAND.outputs)
+    process = begin(count, program, folder)
+    # Of what one process uses, each rank uses a part.
+    killed = kill_rank(process, rank, moment / count)
+    process.communicate(timeout=300)
+    kills.require(process.returncode != 0 or not killed, f"rank {rank} of {count}: exit status 0")
+    kills.check_after_kill(COMMAND, folder, {name: kills.OLDER for name in COMMAND.outputs},
+                           known.files)
+    run(again, program, folder)
+    kills.check_whole(COMMAND, folder, known.files)
+    return killed
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("program", type=pathlib.Path)
+    parser.add_argument("work", type=pathlib.Path)
+    parser.add_argument("--moments", type=int, default=1, help="kills in each stage")
+    parser.add_argument("--most", type=int, default=3, help="ranks at most, 2 or more")
+    parser.add_argument("--seed", type=int, default=random.SystemRandom().randrange(2**32))
+    options = parser.parse_args()
+    print(f"seed {options.seed}")
+    draw = random.Random(options.seed)
+    folder = options.work / "out"
+    known = kills.reference(COMMAND, options.program, folder)
+    faults = 0
+    for count in range(1, options.most + 1):
+        kills.fresh(folder, [])
+        run(count, options.program, folder)
+        kills.check_whole(COMMAND, folder, known.files)
+        print(f"{count} ranks: the bytes of one process", flush=True)
+    for name, first, last in known.stages:
+        if name == kills.WRITING:
+            continue
+        killed = 0
+        for _ in range(options.moments):
+            try:
+                killed += kill_and_go_on(options.program, folder, known, draw, options.most,
+                                         draw.uniform(first, last))
+            except kills.Fault as fault:
+                faults += 1
+                print(f"FAULT: {name}: {fault}")
+        print(f"{name:<24} {killed} of {options.moments} killed before the end", flush=True)
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
