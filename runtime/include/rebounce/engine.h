@@ -80,8 +80,8 @@ class Engine {
   void relight(std::span<const Light> lights, const Sky& sky);
 
   /// One frame with a direct irradiance [n] in lx that the caller brings, from shadow maps for
-  /// instance; its sky is dark, and rows of vertices take patches as evenly lit. Throws Error if the
-  /// size is wrong or a number is negative or not finite, with the index of the patch; the last
+  /// instance; its sky is dark, and rows of vertices take patches as evenly lit. Throws Error if
+  /// the size is wrong or a number is negative or not finite, with the index of the patch; the last
   /// frame then stays.
   void relight(std::span<const Float3> direct_irradiance);
 
