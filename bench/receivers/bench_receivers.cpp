@@ -82,11 +82,10 @@ class ReceiverBenchmark {
   }
 
   std::vector<Float3> shown(const ReceiverRows& rows, std::span<const Float3> indirect,
-                            std::span<const Float3> radiosity,
-                            std::span<const Float3> difference) const {
+                            std::span<const Float3> radiosity) const {
     std::vector<Float3> light(data_.mesh.position.size());
     reconstruct_at_vertices(data_.mesh, indirect, light);
-    ReceiverProducts(rows, data_.patches.area).add(radiosity, difference, light);
+    ReceiverProducts(rows, data_.patches.area).add(radiosity, light);
     clamp_light(light);
     return light;
   }
@@ -119,17 +118,8 @@ class ReceiverBenchmark {
 
   void add_row(const Made& made, double tolerance, std::uint32_t sets, LightKind kind,
                Table& table) {
-    const auto parts = static_cast<std::size_t>(options_.rows.parts_per_patch);
-    auto of_parts =
-        random_initial_exitances(data_, tracer_, kind, options_.lights, kSeed, {}, parts);
-    if (of_parts.empty()) return;
-    std::vector<std::vector<Float3>> lights;
-    for (std::vector<Float3>& light : of_parts) {
-      lights.push_back(mean_of_parts(light, parts));
-      for (std::size_t p = 0; p < light.size(); ++p) {
-        for (std::size_t c = 0; c < kChannelCount; ++c) light[p][c] -= lights.back()[p / parts][c];
-      }
-    }
+    const auto lights = random_initial_exitances(data_, tracer_, kind, options_.lights, kSeed);
+    if (lights.empty()) return;
     const auto radiosities = radiosities_of(*data_.transfer, data_.patches.reflectance, lights);
     std::vector<float> workspace(data_.transfer->workspace_size());
     std::vector<double> error, of_weights;
@@ -137,12 +127,9 @@ class ReceiverBenchmark {
     for (std::size_t k = 0; k < lights.size(); ++k) {
       data_.transfer->apply(lights[k], indirect, workspace);
       if (flux_of(indirect) < kLeastArriving * flux_of(lights[k])) continue;
-      const auto with = [&](const ReceiverRows& rows) {
-        return shown(rows, indirect, radiosities[k], of_parts[k]);
-      };
-      const std::vector<Float3> truth = with(exact_);
-      error.push_back(difference(with(made.rows), truth, indirect));
-      of_weights.push_back(difference(with({}), truth, indirect));
+      const std::vector<Float3> truth = shown(exact_, indirect, radiosities[k]);
+      error.push_back(difference(shown(made.rows, indirect, radiosities[k]), truth, indirect));
+      of_weights.push_back(difference(shown({}, indirect, radiosities[k]), truth, indirect));
     }
     const auto mean = [](std::span<const double> values) {
       double sum = 0;
@@ -166,7 +153,7 @@ class ReceiverBenchmark {
   double time_of(const ReceiverRows& rows, std::span<const Float3> radiosity) const {
     ReceiverProducts products(rows, data_.patches.area);
     std::vector<Float3> light(data_.mesh.position.size());
-    const std::vector<TimedCase> cases{{[&] { products.add(radiosity, {}, light); }}};
+    const std::vector<TimedCase> cases{{[&] { products.add(radiosity, light); }}};
     return time_interleaved(cases, {.rounds = options_.common.repeats}).front().minimum;
   }
 

@@ -69,8 +69,7 @@ struct ReconstructionComparison {
 /// Compares the smooth reconstruction of `indirect_irradiance` [n] with the path tracer's `truth`
 /// at `points` (sample_surface), each of equal weight. The value at a point is that of the display
 /// mesh: patch values brought to its vertices by the reconstruction weights and, with `radiosity`
-/// [n] in lx and what parts of patches shine more [n K], by the rows of vertices that data has,
-/// then interpolated.
+/// [n] in lx, by the rows of vertices that data has, then interpolated.
 ///
 /// `mesh_tracer` holds the first surface_count triangles of data.mesh. Left out are points whose
 /// view is all but back faces (the floor under a box: nobody sees them) and points that the mesh
@@ -82,7 +81,6 @@ ReconstructionComparison compare_reconstruction(const TransferData& data,
                                                 std::span<const Float3> indirect_irradiance,
                                                 std::span<const SurfacePoint> points,
                                                 const IrradianceEstimate& truth,
-                                                std::span<const Float3> radiosity = {},
-                                                std::span<const Float3> part_difference = {});
+                                                std::span<const Float3> radiosity = {});
 
 }  // namespace rebounce::reference

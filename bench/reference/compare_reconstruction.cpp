@@ -108,8 +108,7 @@ ReconstructionComparison compare_reconstruction(const TransferData& data,
                                                 std::span<const Float3> indirect_irradiance,
                                                 std::span<const SurfacePoint> points,
                                                 const IrradianceEstimate& truth,
-                                                std::span<const Float3> radiosity,
-                                                std::span<const Float3> part_difference) {
+                                                std::span<const Float3> radiosity) {
   if (indirect_irradiance.size() != data.patches.size() || truth.mean.size() != points.size()) {
     throw Error("comparison of the reconstruction: one entry per patch and point is needed");
   }
@@ -119,8 +118,7 @@ ReconstructionComparison compare_reconstruction(const TransferData& data,
   std::vector<Float3> at_vertices(data.mesh.position.size());
   reconstruct_at_vertices(data.mesh, indirect_irradiance, at_vertices);
   if (!radiosity.empty()) {
-    ReceiverProducts(data.receiver_rows, data.patches.area)
-        .add(radiosity, part_difference, at_vertices);
+    ReceiverProducts(data.receiver_rows, data.patches.area).add(radiosity, at_vertices);
   }
   clamp_light(at_vertices);
   MeshLocator locator(data.mesh, mesh_tracer);

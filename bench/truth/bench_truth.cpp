@@ -87,7 +87,7 @@ class TruthBench {
     }
     const reference::ReconstructionComparison shown = reference::compare_reconstruction(
         solution.data, solution.tracer, solution.indirect_irradiance, points_, truth_,
-        solution.radiosity, solution.part_difference);
+        solution.radiosity);
     if (last && !options_.point_csv.empty()) {
       reference::write_point_table(options_.point_csv, solution.data, points_, truth_, shown);
     }
@@ -245,9 +245,6 @@ void add_options(CLI::App& app, Options& options) {
       ->capture_default_str();
   app.add_option("--receiver-sets", options.rows.most_sets,
                  "Sets that a group of them sees at most")
-      ->capture_default_str();
-  app.add_option("--receiver-parts", options.rows.parts_per_patch,
-                 "Parts of a patch of which they tell the direct light apart")
       ->capture_default_str();
   app.add_option("--receiver-tolerance", options.rows.tolerance, "Error at which rows end")
       ->capture_default_str();

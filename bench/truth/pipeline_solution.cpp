@@ -1,6 +1,5 @@
 #include "bench/truth/pipeline_solution.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "precompute/build/transfer_build.h"
@@ -54,21 +53,15 @@ Solution solve_scene(const std::string& scene, const PipelineSettings& settings,
   RayTracer tracer = make_surface_tracer(data.mesh);
   const PatchTable& patches = data.patches;
   std::vector<Float3> exitance(patches.size()), radiosity(patches.size());
-  const std::size_t parts = data.receiver_rows.parts_per_patch(patches.size());
-  DirectLighting direct(
-      data, tracer, {.points_per_patch = std::max(settings.direct_points, static_cast<int>(parts))},
-      ShadowMethod::kVolumes, parts);
-  direct.compute(lights, sky, exitance);
-  std::vector<Float3> difference(parts > 1 ? patches.size() * parts : 0);
-  if (parts > 1) direct.reflect_at_parts(difference);
+  DirectLighting(data, tracer, {.points_per_patch = settings.direct_points})
+      .compute(lights, sky, exitance);
   add_reflected(patches.emitted_exitance, patches.reflectance, exitance, exitance);
   const auto form_factors = make_form_factors(kMethod, data.exchange, patches.area);
   const SolveResult result = solve_radiosity(
       kMethod, *form_factors, {patches.area, patches.reflectance}, exitance, {}, radiosity);
   if (!result.converged) throw Error(scene + ": the solver did not converge");
   std::vector<Float3> indirect = gather(*form_factors, radiosity);
-  return {std::move(data), std::move(tracer), std::move(indirect), std::move(radiosity),
-          std::move(difference)};
+  return {std::move(data), std::move(tracer), std::move(indirect), std::move(radiosity)};
 }
 
 void draw_error(const Solution& solution, const PatchComparison& patches, const std::string& path) {

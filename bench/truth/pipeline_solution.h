@@ -26,7 +26,6 @@ struct Solution {
   RayTracer tracer;                         ///< the surface of data.mesh
   std::vector<Float3> indirect_irradiance;  ///< [n] lx
   std::vector<Float3> radiosity;            ///< [n] lx
-  std::vector<Float3> part_difference;      ///< [n K] lx, if the rows of vertices have parts
 };
 
 /// Solves the scene of a file under these lights with the form factors themselves: an operator adds

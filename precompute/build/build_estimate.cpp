@@ -99,10 +99,7 @@ std::uint64_t bytes_of_weights(const BuiltScene& scene) {
 std::uint64_t bytes_of_receiver_rows(const PatchModel& model, const ReceiverRowSettings& rows) {
   if (!rows.at_vertices) return 0;
   const std::uint64_t n = model.patches.size(), rays = static_cast<std::uint64_t>(rows.ray_count);
-  // Of each part under the lights that sets are chosen by: its light, the mean and a running sum.
-  constexpr std::uint64_t kOfPart = 32 * (sizeof(Float3) + sizeof(float) + sizeof(double));
   return sizeof(std::uint64_t) * n * std::min(n, rays) +
-         kOfPart * n * static_cast<std::uint64_t>(rows.parts_per_patch) +
          4 * std::uint64_t{rows.most_sets} * model.mesh.position.size();
 }
 

@@ -42,7 +42,6 @@ std::string settings_json(const BuildSettings& settings, double form_factor_tole
                       {"receiver_row_rays", settings.receiver_rows.ray_count},
                       {"receiver_row_tolerance", settings.receiver_rows.tolerance},
                       {"receiver_row_sets", settings.receiver_rows.most_sets},
-                      {"receiver_row_parts", settings.receiver_rows.parts_per_patch},
                       {"lightmap_size", settings.lightmap.size},
                       {"lightmap_padding", settings.lightmap.padding}};
   if (is_hierarchical(settings)) json["tolerance"] = settings.tolerance;

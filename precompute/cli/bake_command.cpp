@@ -30,13 +30,11 @@ void run(const BakeOptions& chosen, const CommonOptions& options) {
   warn_of_lamps(engine, setup.lights, options);
   const std::vector<Float3> emitted = irradiance_from_emitters(*data);
   const std::vector<Float3> reflected = reflected_exitance(engine);
-  const std::vector<Float3> difference = part_difference(engine);
   const PictureLight light{.lights = setup.lights,
                            .sky = setup.sky,
                            .indirect_irradiance = engine.indirect_irradiance(),
                            .emitted_irradiance = emitted,
-                           .reflected_exitance = reflected,
-                           .part_difference = difference};
+                           .reflected_exitance = reflected};
   const RayTracer& tracer = *engine.parts().tracer;
   const ChosenCamera camera = choose_camera(chosen.camera, *data, tracer);
   const LitMesh mesh = light_mesh(*data, tracer, light, camera.camera, chosen.settings);

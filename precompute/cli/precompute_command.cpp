@@ -365,13 +365,6 @@ void add_output_options(CLI::App& command, PrecomputeOptions& chosen) {
       ->check(CLI::Range(4U, ReceiverRows::kMostSets))
       ->capture_default_str();
   command
-      .add_option(
-          "--receiver-parts", rows.parts_per_patch,
-          "Parts of a patch of which rows of vertices tell the direct light apart; an engine "
-          "looks at lamps at one point of each, at least")
-      ->check(CLI::Range(1, 64))
-      ->capture_default_str();
-  command
       .add_option("--surface-harmonics", chosen.settings.surface_harmonics.ray_count,
                   "Store the directions from which light arrives at patches, for normal maps; rays "
                   "of each patch")

@@ -97,8 +97,6 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
   light.emitted_irradiance = emitted_irradiance;
   const std::vector<Float3> reflected = reflected_exitance(engine);
   light.reflected_exitance = reflected;
-  const std::vector<Float3> difference = part_difference(engine);
-  light.part_difference = difference;
   light.error = error;
   const PictureRenderer renderer(*data, *engine.parts().tracer);
   if (!settings.exposure && is_light(settings.show)) {

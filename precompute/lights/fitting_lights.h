@@ -44,10 +44,4 @@ inline constexpr std::size_t kFittingLightBytes =
 DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& tracer,
                                 std::uint64_t seed, const PatchRoles& roles = {});
 
-/// Draws fewer lights like the training lights, one for `share` of them, each an initial exitance
-/// [n parts] in lx of the parts of patches (ReceiverRows).
-std::vector<std::vector<Float3>> draw_few_lights(const TransferData& data, const RayTracer& tracer,
-                                                 std::uint64_t seed, const PatchRoles& roles,
-                                                 int share, std::size_t parts);
-
 }  // namespace rebounce

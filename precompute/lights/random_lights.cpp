@@ -91,41 +91,19 @@ std::vector<Exitance> random_patches(const PatchTable& patches, int count, std::
   return exitances;
 }
 
-/// Values of patches for each of their parts.
-Exitance repeated(std::span<const Float3> of_patches, std::size_t parts) {
-  Exitance result;
-  result.reserve(of_patches.size() * parts);
-  for (const Float3& value : of_patches) result.insert(result.end(), parts, value);
-  return result;
-}
-
-/// The initial exitance of sources, or of their parts, under each of `lights`, and before them
-/// under the sky if it has any luminance.
+/// The initial exitance of sources under each of `lights`, and before them under the sky if it has
+/// any luminance.
 std::vector<Exitance> lit_by(const TransferData& data, const RayTracer& tracer,
-                             const PatchRoles& roles, std::size_t parts,
-                             std::span<const Light> lights, const Sky& sky = {}) {
-  const DirectLightingSettings defaults;
-  DirectLighting direct_lighting(
-      data, tracer,
-      {.points_per_patch = std::max(defaults.points_per_patch, static_cast<int>(parts))},
-      ShadowMethod::kVolumes, parts);
-  Exitance difference(parts > 1 ? data.patches.size() * parts : 0);
+                             const PatchRoles& roles, std::span<const Light> lights,
+                             const Sky& sky = {}) {
+  DirectLighting direct_lighting(data, tracer);
   std::vector<Exitance> exitances;
   const auto add = [&](std::span<const Light> light, const Sky& with_sky) {
     Exitance exitance(data.patches.size());
     direct_lighting.compute(light, with_sky, exitance);
     reflect(data.patches.reflectance, exitance);
     roles.keep(PatchRoles::kSource, exitance);
-    if (!(area_norm(exitance, data.patches.area) > 0)) return;
-    if (parts > 1) {
-      direct_lighting.reflect_at_parts(difference);
-      exitance = repeated(exitance, parts);
-      for (std::size_t p = 0; p < exitance.size(); ++p) {
-        if (!roles.is_source(p / parts)) continue;
-        for (std::size_t c = 0; c < kChannelCount; ++c) exitance[p][c] += difference[p][c];
-      }
-    }
-    exitances.push_back(std::move(exitance));
+    if (area_norm(exitance, data.patches.area) > 0) exitances.push_back(std::move(exitance));
   };
   if (sky.luminance > 0) add({}, sky);
   for (const Light& light : lights) add({&light, 1}, {});
@@ -179,35 +157,19 @@ std::vector<Light> random_point_lights(const TransferData& data, const RayTracer
 
 std::vector<Exitance> random_initial_exitances(const TransferData& data, const RayTracer& tracer,
                                                LightKind kind, int count, std::uint64_t seed,
-                                               const PatchRoles& roles, std::size_t parts) {
-  const auto lit = [&](std::span<const Light> lights, const Sky& sky = {}) {
-    return lit_by(data, tracer, roles, parts, lights, sky);
-  };
+                                               const PatchRoles& roles) {
   switch (kind) {
     case LightKind::kPoint:
-      return lit(random_point_lights(data, tracer, count, seed, roles));
+      return lit_by(data, tracer, roles, random_point_lights(data, tracer, count, seed, roles));
     case LightKind::kSpot:
-      return lit(random_spots(data, tracer, count, seed, roles));
-    case LightKind::kPatch: {
-      std::vector<Exitance> exitances = random_patches(data.patches, count, seed, roles);
-      for (Exitance& exitance : exitances) exitance = repeated(exitance, parts);
-      return exitances;
-    }
+      return lit_by(data, tracer, roles, random_spots(data, tracer, count, seed, roles));
+    case LightKind::kPatch:
+      return random_patches(data.patches, count, seed, roles);
     case LightKind::kSky:
       break;
   }
   if (count == 0 || !is_open(data.patches)) return {};
-  return lit(random_suns(count - 1, seed), {.luminance = 1});
-}
-
-std::vector<Float3> mean_of_parts(std::span<const Float3> exitance, std::size_t parts) {
-  std::vector<Float3> mean(exitance.size() / parts, Float3{0, 0, 0});
-  for (std::size_t p = 0; p < exitance.size(); ++p) {
-    for (std::size_t c = 0; c < kChannelCount; ++c) {
-      mean[p / parts][c] += exitance[p][c] / static_cast<float>(parts);
-    }
-  }
-  return mean;
+  return lit_by(data, tracer, roles, random_suns(count - 1, seed), {.luminance = 1});
 }
 
 bool arrives_nowhere(std::span<const Float3> irradiance, std::span<const Float3> exitance,

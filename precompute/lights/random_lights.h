@@ -35,15 +35,11 @@ std::vector<Light> random_point_lights(const TransferData& data, const RayTracer
 
 /// The initial exitances [at most count][n] in lx of `count` random lights of a kind, one light at
 /// a time; 0 for patches that are no sources. Lights that reach no source are left out, which can
-/// be all of them. With `parts` > 1 they are [n parts], of the parts of patches (ReceiverRows).
+/// be all of them.
 std::vector<std::vector<Float3>> random_initial_exitances(const TransferData& data,
                                                           const RayTracer& tracer, LightKind kind,
                                                           int count, std::uint64_t seed,
-                                                          const PatchRoles& roles = {},
-                                                          std::size_t parts = 1);
-
-/// The mean [n] of what parts [n parts] of patches give off.
-std::vector<Float3> mean_of_parts(std::span<const Float3> exitance, std::size_t parts);
+                                                          const PatchRoles& roles = {});
 
 /// True if at most a millionth of the light arrives anywhere, as for a lamp inside a box. No error
 /// can be relative to such a light; it is left out of the errors of operators and of form factors

@@ -6,24 +6,23 @@
 #include <numeric>
 
 #include "precompute/base/parallel_progress.h"
-#include "precompute/lights/fitting_lights.h"
+#include "precompute/compression/form_factor_compression.h"
 #include "precompute/lights/random_lights.h"
 #include "precompute/outputs/receiver_sets.h"
 #include "precompute/outputs/receiver_views.h"
 #include "rebounce/error.h"
 #include "runtime/rays/triangle.h"
 #include "transfer/base/grouped.h"
-#include "transfer/base/reflection.h"
 
 namespace rebounce {
 namespace {
 
-constexpr int kFewestVertexRays = 64, kMostParts = 64;
+constexpr int kFewestVertexRays = 64;
 constexpr std::uint32_t kGroup = ReceiverRows::kGroup, kSetStep = ReceiverRows::kSetStep;
-constexpr std::size_t kBatchGroups = 64;  // of which the rows are in memory at a time
+constexpr std::size_t kBatchGroups = 128;  // of which the rows are in memory at a time
 
-// Sets are chosen by one for so many of the lights that operators are fitted to: about 32.
-constexpr int kLightsShare = 6;
+// Lights to choose sets by, of those that operators are fitted to.
+constexpr std::size_t kLights = 32;
 
 // Errors are relative to the light at a vertex or, if that is more, to this part of the light in
 // the scene's root mean square.
@@ -39,74 +38,47 @@ constexpr float kLargestByte = 127;
 
 /// Lights that the scene may have: what patches send, and what vertices get by their weights.
 struct Lights {
-  std::vector<std::vector<Float3>> radiosity;  ///< [lights][n K] lx, of parts
-  Eigen::MatrixXf sent;                        ///< [n][lights] lx of patches, mean of the channels
+  std::vector<std::vector<Float3>> radiosity;  ///< [lights][n] lx
   Eigen::MatrixXf irradiance;                  ///< [n][lights] lx, mean of the channels
   Eigen::VectorXf usual;                       ///< [lights] the root mean square over the area
 };
 
-float mean_of_channels(const Float3& value) {
-  return (value[0] + value[1] + value[2]) / kChannelCount;
-}
-
-Lights light_scene(const TransferData& data, const RayTracer& tracer, std::size_t parts,
-                   std::uint64_t seed) {
+Lights light_scene(const TransferData& data, const RayTracer& tracer, std::uint64_t seed) {
   const PatchTable& patches = data.patches;
+  const DrawnLights drawn = draw_fitting_lights(data, tracer, seed, data.transfer->roles());
   const double whole = std::accumulate(patches.area.begin(), patches.area.end(), 0.0);
-  Lights lights;
-  std::vector<std::vector<Float3>> arriving, sent;
+  const std::size_t count = std::min(kLights, drawn.training.size());
+  std::vector<std::vector<Float3>> exitance, arriving;
   std::vector<float> workspace(data.transfer->workspace_size());
-  for (std::vector<Float3>& light :
-       draw_few_lights(data, tracer, seed, data.transfer->roles(), kLightsShare, parts)) {
-    const std::vector<Float3> mean = mean_of_parts(light, parts);
-    std::vector<Float3> arrives(patches.size()), reflected(patches.size());
-    data.transfer->apply(mean, arrives, workspace);
-    if (arrives_nowhere(arrives, mean, patches.area)) continue;
-    add_reflected(mean, patches.reflectance, arrives, reflected);
-    for (std::size_t p = 0; p < light.size(); ++p) {
-      const std::size_t i = p / parts;
-      for (std::size_t c = 0; c < kChannelCount; ++c) light[p][c] += reflected[i][c] - mean[i][c];
-    }
-    lights.radiosity.push_back(std::move(light));
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::vector<Float3>& light = drawn.training[k * drawn.training.size() / count];
+    std::vector<Float3> arrives(patches.size());
+    data.transfer->apply(light, arrives, workspace);
+    if (arrives_nowhere(arrives, light, patches.area)) continue;
+    exitance.push_back(light);
     arriving.push_back(std::move(arrives));
-    sent.push_back(std::move(reflected));
   }
-  const auto n = static_cast<Eigen::Index>(patches.size());
-  const auto count = static_cast<Eigen::Index>(arriving.size());
-  lights.sent.resize(n, count);
-  lights.irradiance.resize(n, count);
-  lights.usual.resize(count);
-  for (Eigen::Index k = 0; k < count; ++k) {
+  Lights lights;
+  lights.radiosity = radiosities_of(*data.transfer, patches.reflectance, exitance);
+  lights.irradiance.resize(static_cast<Eigen::Index>(patches.size()),
+                           static_cast<Eigen::Index>(arriving.size()));
+  lights.usual.resize(static_cast<Eigen::Index>(arriving.size()));
+  for (std::size_t k = 0; k < arriving.size(); ++k) {
     double square = 0;
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const auto light = static_cast<std::size_t>(k), patch = static_cast<std::size_t>(i);
-      const float mean = mean_of_channels(arriving[light][patch]);
-      lights.sent(i, k) = mean_of_channels(sent[light][patch]);
-      lights.irradiance(i, k) = mean;
-      square += static_cast<double>(patches.area[patch]) * mean * mean;
+    for (std::size_t i = 0; i < patches.size(); ++i) {
+      const auto& [r, g, b] = arriving[k][i];
+      const float mean = (r + g + b) / kChannelCount;
+      lights.irradiance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k)) = mean;
+      square += static_cast<double>(patches.area[i]) * mean * mean;
     }
-    lights.usual[k] = static_cast<float>(std::sqrt(square / whole));
+    lights.usual[static_cast<Eigen::Index>(k)] = static_cast<float>(std::sqrt(square / whole));
   }
   return lights;
 }
 
-/// The parts of patches as patches of their own, by the points that stand for them.
-PatchTable parts_of(const PatchTable& patches, std::span<const ReceiverPoint> point) {
-  const std::size_t parts = point.size() / patches.size();
-  PatchTable table;
-  for (std::size_t p = 0; p < point.size(); ++p) {
-    table.area.push_back(patches.area[p / parts] / static_cast<float>(parts));
-    table.centroid.push_back(parts > 1 ? point[p].position : patches.centroid[p]);
-    table.normal.push_back(parts > 1 ? point[p].normal : patches.normal[p]);
-    table.reflectance.push_back(patches.reflectance[p / parts]);
-  }
-  return table;
-}
-
 /// What rows of one vertex add.
 struct VertexRow {
-  ViewRow seen;           ///< by position of the tree of parts, ascending
-  ViewRow weighted;       ///< the rows of its patches by its weights, by patch, ascending
+  ViewRow added;          ///< by position of the tree, ascending
   Eigen::VectorXf light;  ///< [lights] that it gets then, lx
   double gain = 0;        ///< root mean square of what they add, relative to that
 };
@@ -119,10 +91,8 @@ class RowBuilder {
         shown_patch_(shown_patch),
         tracer_(tracer),
         settings_(settings),
-        parts_(static_cast<std::size_t>(settings.parts_per_patch)),
-        points_(receiver_points(data, {.points_per_patch = settings.parts_per_patch})),
-        lights_(light_scene(data, tracer, parts_, seed)),
-        sources_(parts_of(data.patches, points_), lights_.radiosity),
+        lights_(light_scene(data, tracer, seed)),
+        sources_(data.patches, lights_.radiosity),
         triangles_(data.mesh.position.size(), [&](const auto& add) {
           for (std::uint32_t t = 0; t < shown_patch.size(); ++t) {
             if (shown_patch[t] == kNone) continue;
@@ -133,7 +103,7 @@ class RowBuilder {
   ReceiverRows build(const Progress& progress) {
     look_from_patches(part_of(progress, 0, kPatchShare));
     const std::vector<std::uint32_t> order = vertex_order();
-    rows_.part = sources_.tree.patch;
+    rows_.patch = sources_.tree.patch;
     rows_.group_begin = {0};
     set_of_cluster_.assign(sources_.tree.clusters.size(), kNone);
     const Progress rest = part_of(progress, kPatchShare, 1);
@@ -163,7 +133,7 @@ class RowBuilder {
     ParallelProgress parallel(progress, n);
 #pragma omp parallel
     {
-      ReceiverViewer viewer(data_.mesh, shown_patch_, n, points_, tracer_, settings_.ray_count);
+      ReceiverViewer viewer(data_.mesh, shown_patch_, n, tracer_, settings_.ray_count);
 #pragma omp for schedule(dynamic, 16)
       for (std::size_t i = 0; i < n; ++i) {
         if (parallel.stopped()) continue;
@@ -210,7 +180,7 @@ class RowBuilder {
     const double sight = mean_patch_size();
 #pragma omp parallel
     {
-      ReceiverViewer viewer(data_.mesh, shown_patch_, data_.patches.size(), points_, tracer_,
+      ReceiverViewer viewer(data_.mesh, shown_patch_, data_.patches.size(), tracer_,
                             settings_.ray_count);
       std::vector<double> sum(data_.patches.size(), 0.0);
 #pragma omp for schedule(dynamic, 16)
@@ -235,35 +205,33 @@ class RowBuilder {
     for (const Group& group : groups) append(group);
   }
 
-  /// The row of a vertex beside those of the patches in its weights. `sum` [n] is zero before and
+  /// The row less those of the patches in the weights of the vertex. `sum` [n] is zero before and
   /// after.
   VertexRow compare(std::uint32_t vertex, const ViewRow& row, std::vector<double>& sum) const {
     const DisplayMesh& mesh = data_.mesh;
     VertexRow result;
-    result.light.setZero(lights_.usual.size());
-    Eigen::VectorXf added = Eigen::VectorXf::Zero(lights_.usual.size());
-    for (const auto& [part, share] : row) {
-      const std::uint32_t p = sources_.position[part];
-      result.seen.push_back({p, share});
-      added += share * sources_.light.row(p).transpose();
-    }
-    std::ranges::sort(result.seen, {}, &ViewEntry::source);
     std::vector<std::uint32_t> touched;
-    for (std::uint32_t k = mesh.weight_begin[vertex]; k < mesh.weight_begin[vertex + 1]; ++k) {
-      const std::uint32_t i = mesh.weight_patch[k];
-      result.light += mesh.weight[k] * lights_.irradiance.row(i).transpose();
-      for (const auto& [patch, share] : patch_rows_[i]) {
-        if (sum[patch] == 0) touched.push_back(patch);
-        sum[patch] += static_cast<double>(mesh.weight[k]) * share;
+    const auto add = [&](const ViewRow& from, double weight) {
+      for (const auto& [patch, part] : from) {
+        const std::uint32_t p = sources_.position[patch];
+        if (sum[p] == 0) touched.push_back(p);
+        sum[p] += weight * part;
       }
+    };
+    result.light.setZero(lights_.usual.size());
+    add(row, 1);
+    for (std::uint32_t k = mesh.weight_begin[vertex]; k < mesh.weight_begin[vertex + 1]; ++k) {
+      add(patch_rows_[mesh.weight_patch[k]], -static_cast<double>(mesh.weight[k]));
+      result.light += mesh.weight[k] * lights_.irradiance.row(mesh.weight_patch[k]).transpose();
     }
     std::ranges::sort(touched);
-    for (const std::uint32_t patch : touched) {
-      if (sum[patch] == 0) continue;
-      const auto share = static_cast<float>(sum[patch]);
-      sum[patch] = 0;
-      result.weighted.push_back({patch, share});
-      added -= share * lights_.sent.row(patch).transpose();
+    Eigen::VectorXf added = Eigen::VectorXf::Zero(lights_.usual.size());
+    for (const std::uint32_t p : touched) {
+      if (sum[p] == 0) continue;
+      const auto part = static_cast<float>(sum[p]);
+      sum[p] = 0;
+      result.added.push_back({p, part});
+      added += part * sources_.light.row(p).transpose();
     }
     result.light = (result.light + added).cwiseMax(kDim * lights_.usual);
     if (added.size() > 0) {
@@ -273,35 +241,23 @@ class RowBuilder {
     return result;
   }
 
-  /// The rows of a group less those of the patches in the weights, which see parts of a patch
-  /// alike.
   GroupRows rows_of(std::span<const VertexRow> found, std::span<const std::uint32_t> kept) const {
     GroupRows rows;
-    const auto for_each = [&](const VertexRow& row, const auto& add) {
-      for (const auto& [position, share] : row.seen) add(position, share);
-      for (const auto& [patch, share] : row.weighted) {
-        for (std::size_t p = patch * parts_; p < (patch + 1) * parts_; ++p) {
-          add(sources_.position[p], -share / static_cast<float>(parts_));
-        }
-      }
-    };
-    std::vector<bool> is_there(sources_.position.size(), false);
     for (const std::uint32_t k : kept) {
-      for_each(found[k], [&](std::uint32_t position, float) { is_there[position] = true; });
+      for (const ViewEntry& entry : found[k].added) rows.position.push_back(entry.patch);
     }
-    std::vector<Eigen::Index> column(is_there.size());
-    for (std::uint32_t p = 0; p < is_there.size(); ++p) {
-      if (!is_there[p]) continue;
-      column[p] = static_cast<Eigen::Index>(rows.position.size());
-      rows.position.push_back(p);
-    }
+    std::ranges::sort(rows.position);
+    rows.position.erase(std::unique(rows.position.begin(), rows.position.end()),
+                        rows.position.end());
     rows.part.setZero(static_cast<Eigen::Index>(kept.size()),
                       static_cast<Eigen::Index>(rows.position.size()));
     rows.light.setZero(lights_.usual.size());
     for (std::size_t i = 0; i < kept.size(); ++i) {
-      for_each(found[kept[i]], [&](std::uint32_t position, float share) {
-        rows.part(static_cast<Eigen::Index>(i), column[position]) += share;
-      });
+      Eigen::Index column = 0;
+      for (const auto& [position, part] : found[kept[i]].added) {
+        while (rows.position[static_cast<std::size_t>(column)] != position) ++column;
+        rows.part(static_cast<Eigen::Index>(i), column) = part;
+      }
       rows.light += found[kept[i]].light.cwiseAbs2();
     }
     rows.light = (rows.light / static_cast<float>(kept.size())).cwiseSqrt();
@@ -412,8 +368,6 @@ class RowBuilder {
   std::span<const std::uint32_t> shown_patch_;
   const RayTracer& tracer_;
   const ReceiverRowSettings& settings_;
-  const std::size_t parts_;                  ///< K, of a patch
-  const std::vector<ReceiverPoint> points_;  ///< [n][K]
   const Lights lights_;
   const ReceiverSources sources_;
   const Grouped<std::uint32_t> triangles_;  ///< of each vertex, those that show a patch
@@ -434,9 +388,6 @@ ReceiverRows make_receiver_rows(const TransferData& data,
   if (!(settings.tolerance >= 0) || settings.most_sets < kSetStep ||
       settings.most_sets > ReceiverRows::kMostSets) {
     throw Error("rows of receivers: the tolerance must be at least 0, the sets from 4 to 1024");
-  }
-  if (settings.parts_per_patch < 1 || settings.parts_per_patch > kMostParts) {
-    throw Error("rows of receivers: a patch has from 1 to 64 parts");
   }
   if (!data.transfer) throw Error("rows of receivers need an operator; make one");
   return RowBuilder(data, shown_patch, tracer, settings, seed).build(progress);

@@ -1,7 +1,7 @@
 #include "precompute/outputs/receiver_sets.h"
 
 #include <algorithm>
-#include <utility>
+#include <queue>
 
 namespace rebounce {
 namespace {
@@ -21,7 +21,6 @@ struct Candidate {
   double error;
   std::uint32_t cluster;
   std::size_t first, last;
-  Eigen::MatrixXf arriving;  ///< [receivers][lights + 1] of the columns: see lit_
 
   bool operator<(const Candidate& other) const {
     return error != other.error ? error < other.error : cluster > other.cluster;
@@ -34,14 +33,13 @@ class SetChoice {
             const ReceiverSetSettings& settings)
       : sources_(sources), rows_(rows), settings_(settings) {
     const auto columns = static_cast<Eigen::Index>(rows.position.size());
-    lit_.setOnes(columns, sources.light.cols() + 1);
+    lit_.resize(columns, sources.light.cols());
     area_.resize(columns);
     weight_.resize(columns);
     const double whole = sources.area_before.back();
     for (Eigen::Index k = 0; k < columns; ++k) {
       const std::uint32_t p = rows.position[static_cast<std::size_t>(k)];
-      lit_.row(k).head(sources.light.cols()) =
-          sources.light.row(p).array() / rows.light.transpose().array();
+      lit_.row(k) = sources.light.row(p).array() / rows.light.transpose().array();
       const double area = sources.area_before[p + 1] - sources.area_before[p];
       const double there = rows.part.col(k).cast<double>().squaredNorm() /
                            static_cast<double>(rows.part.rows()) / (area * area);
@@ -52,62 +50,43 @@ class SetChoice {
   }
 
   std::vector<std::uint32_t> choose() {
-    add(0, 0, rows_.position.size(), arriving(0, rows_.position.size()));
+    add(0, 0, rows_.position.size());
     const double enough = settings_.tolerance * settings_.tolerance;
     while (!open_.empty() && chosen_ < settings_.most_sets && error_ > enough) divide_worst();
     std::vector<std::uint32_t> sets(std::move(leaves_));
-    for (const Candidate& candidate : open_) sets.push_back(candidate.cluster);
+    for (; !open_.empty(); open_.pop()) sets.push_back(open_.top().cluster);
     std::ranges::sort(sets, {}, [&](std::uint32_t c) { return sources_.tree.clusters[c].begin; });
     return sets;
   }
 
  private:
   void divide_worst() {
-    std::pop_heap(open_.begin(), open_.end());
-    const Candidate worst = std::move(open_.back());
-    open_.pop_back();
+    const Candidate worst = open_.top();
+    open_.pop();
     --chosen_;
     error_ -= worst.error;
     const std::uint32_t child = sources_.tree.clusters[worst.cluster].first_child;
     const std::uint32_t border = sources_.tree.clusters[child + 1].begin;
     const auto middle = std::lower_bound(rows_.position.begin(), rows_.position.end(), border);
     const auto split = static_cast<std::size_t>(middle - rows_.position.begin());
-    // The sums of the smaller part, and what is left of the whole.
-    const bool first_is_smaller = split - worst.first < worst.last - split;
-    Eigen::MatrixXf one =
-        first_is_smaller ? arriving(worst.first, split) : arriving(split, worst.last);
-    Eigen::MatrixXf other = worst.arriving - one;
-    if (!first_is_smaller) one.swap(other);
-    add(child, worst.first, split, std::move(one));
-    add(child + 1, split, worst.last, std::move(other));
+    add(child, worst.first, split);
+    add(child + 1, split, worst.last);
   }
 
-  /// What columns bring to each receiver. Column by column: BLAS may sum in an order that depends
-  /// on the number of threads.
-  Eigen::MatrixXf arriving(std::size_t first, std::size_t last) const {
-    Eigen::MatrixXf sum = Eigen::MatrixXf::Zero(rows_.part.rows(), lit_.cols());
-    for (auto k = static_cast<Eigen::Index>(first); k < static_cast<Eigen::Index>(last); ++k) {
-      sum.noalias() += rows_.part.col(k) * lit_.row(k);
-    }
-    return sum;
-  }
-
-  void add(std::uint32_t cluster, std::size_t first, std::size_t last, Eigen::MatrixXf sums) {
+  void add(std::uint32_t cluster, std::size_t first, std::size_t last) {
     if (first == last) return;
     ++chosen_;
     if (sources_.tree.clusters[cluster].is_leaf()) {
       leaves_.push_back(cluster);
       return;
     }
-    const double error = error_of(sources_.tree.clusters[cluster], first, last, sums);
+    const double error = error_of(sources_.tree.clusters[cluster], first, last);
     error_ += error;
-    open_.push_back({error, cluster, first, last, std::move(sums)});
-    std::push_heap(open_.begin(), open_.end());
+    open_.push({error, cluster, first, last});
   }
 
   /// The mean square of the relative error at a receiver, if a cluster shines evenly.
-  double error_of(const Cluster& cluster, std::size_t first, std::size_t last,
-                  const Eigen::MatrixXf& sums) const {
+  double error_of(const Cluster& cluster, std::size_t first, std::size_t last) const {
     const auto begin = static_cast<Eigen::Index>(cluster.begin);
     const Eigen::Index end = begin + static_cast<Eigen::Index>(cluster.count);
     const auto from = static_cast<Eigen::Index>(first);
@@ -115,13 +94,15 @@ class SetChoice {
     const double area =
         sources_.area_before[cluster.begin + cluster.count] - sources_.area_before[cluster.begin];
     const auto part = rows_.part.middleCols(from, count);
-    const Eigen::VectorXf all = sums.rightCols(1);
+    const Eigen::VectorXf all = part.rowwise().sum();
     const Eigen::VectorXf mean =
         ((sources_.light_before.row(end) - sources_.light_before.row(begin)) / area)
             .cast<float>()
             .transpose()
             .cwiseQuotient(rows_.light);
-    const Eigen::MatrixXf off = sums.leftCols(mean.size()) - all * mean.transpose();
+    // Column by column: BLAS may sum in an order that depends on the number of threads.
+    Eigen::MatrixXf off = -all * mean.transpose();
+    for (Eigen::Index k = 0; k < count; ++k) off.noalias() += part.col(k) * lit_.row(from + k);
     const double receivers = static_cast<double>(part.rows());
     const double of_lights = static_cast<double>(off.squaredNorm()) /
                              static_cast<double>(std::max<Eigen::Index>(off.cols(), 1));
@@ -150,9 +131,9 @@ class SetChoice {
   const ReceiverSources& sources_;
   const GroupRows& rows_;
   const ReceiverSetSettings& settings_;
-  Eigen::MatrixXf lit_;            ///< [columns][lights] relative to rows_.light, and a column of 1
+  Eigen::MatrixXf lit_;            ///< [columns][lights] relative to rows_.light
   Eigen::VectorXd area_, weight_;  ///< [columns] m²; of a squared error under a light on it alone
-  std::vector<Candidate> open_;    ///< a heap, the one that errs most on top
+  std::priority_queue<Candidate> open_;
   std::vector<std::uint32_t> leaves_;
   std::uint32_t chosen_ = 0;
   double error_ = 0;  ///< of all in open_

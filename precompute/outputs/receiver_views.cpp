@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/glm.hpp>
-#include <limits>
 #include <numeric>
 
 #include "precompute/sampling/hemisphere_rays.h"
@@ -23,10 +22,6 @@ constexpr double kDualPart = 0.75;  // lab/109
 
 // The weight of places that are not seen, beside that of those that are: it decides where none is.
 constexpr double kUnseen = 1.0 / 64;
-
-// Places with normals at right angles count as this times 1.4 of `sight` apart, in telling parts of
-// patches: light differs more between sides than along them.
-constexpr double kTurn = 0.5;
 
 /// Points on the triangles around a vertex, evenly by area.
 class RingPoints {
@@ -62,18 +57,15 @@ class RingPoints {
 }  // namespace
 
 ReceiverViewer::ReceiverViewer(const DisplayMesh& mesh, std::span<const std::uint32_t> shown_patch,
-                               std::size_t patch_count, std::span<const ReceiverPoint> point,
-                               const RayTracer& tracer, int ray_count)
+                               std::size_t patch_count, const RayTracer& tracer, int ray_count)
     : mesh_(mesh),
       shown_patch_(shown_patch),
-      part_point_(point),
-      parts_(point.size() / patch_count),
       tracer_(tracer),
       point_(static_cast<std::size_t>(ray_count)),
       height_(point_.size()),
       ray_(point_.size()),
       hit_(point_.size()),
-      sum_(point.size(), 0.0) {}
+      sum_(patch_count, 0.0) {}
 
 void ReceiverViewer::trace() {
   make_hemisphere_rays(point_, tracer_, kDirectionShift, ray_);
@@ -83,38 +75,18 @@ void ReceiverViewer::trace() {
   }
 }
 
-std::uint32_t ReceiverViewer::part_at(std::uint32_t patch, const Hit& hit, double sight) const {
-  if (patch == kNone || parts_ == 1) return patch;
-  const auto first = static_cast<std::uint32_t>(patch * parts_);
-  const TriangleCorners corners = corners_of(mesh_, hit.triangle);
-  const glm::dvec3 position = point_at(corners, {hit.u, hit.v});
-  const glm::dvec3 normal = hit.front ? front_normal(corners) : -front_normal(corners);
-  const double turn = std::pow(kTurn * sight, 2);
-  std::uint32_t nearest = first;
-  double least = std::numeric_limits<double>::infinity();
-  for (std::uint32_t p = first; p < first + parts_; ++p) {
-    const glm::dvec3 away = to_dvec3(part_point_[p].position) - position;
-    const glm::dvec3 turned = to_dvec3(part_point_[p].normal) - normal;
-    const double distance = glm::dot(away, away) + turn * glm::dot(turned, turned);
-    if (distance >= least) continue;
-    least = distance;
-    nearest = p;
-  }
-  return nearest;
-}
-
-void ReceiverViewer::add(std::uint32_t source, double part) {
-  if (source == kNone) return;
-  if (sum_[source] == 0) touched_.push_back(source);
-  sum_[source] += part;
+void ReceiverViewer::add(std::uint32_t patch, double part) {
+  if (patch == kNone) return;
+  if (sum_[patch] == 0) touched_.push_back(patch);
+  sum_[patch] += part;
 }
 
 void ReceiverViewer::take(ViewRow& row) {
   std::ranges::sort(touched_);
   row.clear();
-  for (const std::uint32_t source : touched_) {
-    if (sum_[source] != 0) row.push_back({source, static_cast<float>(sum_[source])});
-    sum_[source] = 0;
+  for (const std::uint32_t patch : touched_) {
+    if (sum_[patch] != 0) row.push_back({patch, static_cast<float>(sum_[patch])});
+    sum_[patch] = 0;
   }
   touched_.clear();
 }
@@ -177,8 +149,7 @@ void ReceiverViewer::look_from_vertex(std::uint32_t vertex,
   const double mean = 3 - static_cast<double>(height_.size()) / heights;
   for (std::size_t k = 0; k < height_.size(); ++k) {
     const double dual = 3 * height_[k] - 1 - mean * height_[k];
-    const std::uint32_t patch = patch_at(mesh_, shown_patch_, hit_[k]);
-    add(part_at(patch, hit_[k], sight), (height_[k] + dual_part * dual) / heights);
+    add(patch_at(mesh_, shown_patch_, hit_[k]), (height_[k] + dual_part * dual) / heights);
   }
   take(row);
 }

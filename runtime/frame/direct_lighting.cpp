@@ -1,11 +1,8 @@
 #include "runtime/frame/direct_lighting.h"
 
 #include <algorithm>
-#include <array>
 #include <cassert>
-#include <string>
 
-#include "rebounce/error.h"
 #include "runtime/frame/lamp_at_block.h"
 #include "runtime/frame/receivers.h"
 #include "runtime/lights/sky_light.h"
@@ -23,37 +20,26 @@ constexpr std::size_t kWholeScene = 1024, kLargestPlanes = 64;  // lab/091
 
 /// The irradiance of one light at intensity 1.
 struct DirectLighting::LightResponse {
-  LightResponse(const Receivers& receivers, std::size_t group_count, bool keeps_points)
-      : irradiance(receivers.size()),
-        at_point(keeps_points ? receivers.point.size() * Receivers::kBlock : 0),
-        lit(receivers.block_count()),
-        volumes(group_count) {}
+  LightResponse(std::size_t slot_count, std::size_t block_count, std::size_t group_count)
+      : irradiance(slot_count), lit(block_count), volumes(group_count) {}
 
   PreparedLight light;
   bool known = false;  ///< whether `irradiance` is that of `light`
   bool stale = false;  ///< whether this frame must trace it
   glm::vec3 intensity{0};
   std::vector<float> irradiance;  ///< [slots] per unit of intensity
-  std::vector<float> at_point;    ///< [blocks][points_per_patch][kBlock] if they are kept
   std::vector<std::uint8_t> lit;  ///< [blocks] 0: the irradiance of all slots in the block is 0
   ShadowVolumes volumes;          ///< of `light`, in a frame that traces it
 };
 
 DirectLighting::DirectLighting(const TransferData& data, const RayTracer& tracer,
-                               const DirectLightingSettings& settings, ShadowMethod method,
-                               std::size_t parts)
+                               const DirectLightingSettings& settings, ShadowMethod method)
     : data_(data),
       tracer_(tracer),
       receivers_(std::make_shared<const Receivers>(data, settings)),
       occluders_(std::make_shared<const OccluderGroups>(
           method == ShadowMethod::kVolumes ? find_occluders(data.mesh, kWholeScene, kLargestPlanes)
-                                           : Occluders{.piece = {}, .is_whole = false})),
-      parts_(parts) {
-  if (receivers_->points_per_patch < parts) {
-    throw Error("direct light at " + std::to_string(settings.points_per_patch) +
-                " points of a patch does not tell its " + std::to_string(parts) +
-                " parts apart, which the rows of vertices need; take as many points");
-  }
+                                           : Occluders{.piece = {}, .is_whole = false})) {
   make_room(static_cast<std::size_t>(std::max(0, settings.light_capacity)));
 }
 
@@ -62,7 +48,8 @@ DirectLighting::DirectLighting(const DirectLighting&) = default;
 
 void DirectLighting::make_room(std::size_t light_count) {
   while (responses_.size() < light_count) {
-    responses_.emplace_back(*receivers_, occluders_->group.size(), parts_ > 1);
+    responses_.emplace_back(receivers_->size(), receivers_->block_count(),
+                            occluders_->group.size());
   }
 }
 
@@ -113,24 +100,7 @@ void DirectLighting::respond(LightResponse& response, std::size_t block) const {
           .subspan(block * Receivers::kBlock, receivers_->slots_in(block));
   std::ranges::fill(irradiance, 0.0F);
   response.lit[block] = 0;
-  const auto add = [&](const BlockIrradiance& sums) {
-    add_lamp(*receivers_, tracer_, response.light, *occluders_, response.volumes, block, sums);
-  };
-  if (response.at_point.empty()) {
-    add({irradiance});
-  } else {
-    const std::size_t points = receivers_->points_per_patch;
-    const std::span<float> at_point =
-        std::span(response.at_point)
-            .subspan(block * points * Receivers::kBlock, points * Receivers::kBlock);
-    std::ranges::fill(at_point, 0.0F);
-    add({at_point, Receivers::kBlock});
-    for (std::size_t k = 0; k < points; ++k) {
-      for (std::size_t slot = 0; slot < irradiance.size(); ++slot) {
-        irradiance[slot] += at_point[k * Receivers::kBlock + slot] / static_cast<float>(points);
-      }
-    }
-  }
+  add_lamp(*receivers_, tracer_, response.light, *occluders_, response.volumes, block, irradiance);
   response.lit[block] = std::ranges::any_of(irradiance, [](float e) { return e > 0; }) ? 1 : 0;
 }
 
@@ -146,37 +116,6 @@ void DirectLighting::add_up(const Sky& sky, std::size_t block,
       const float e = response.irradiance[begin + k];
       Float3& sum = direct_irradiance[patch[k]];
       sum = {sum[0] + e * intensity.x, sum[1] + e * intensity.y, sum[2] + e * intensity.z};
-    }
-  }
-}
-
-void DirectLighting::reflect_at_parts(std::span<Float3> difference,
-                                      const Scheduler& scheduler) const {
-  assert(parts_ > 1 && difference.size() == parts_ * data_.patches.size());
-  parallel_for_pieces(scheduler, receivers_->block_count(), kAddedPerTask,
-                      [&](std::size_t block) { reflect_at_parts(block, difference); });
-}
-
-void DirectLighting::reflect_at_parts(std::size_t block, std::span<Float3> difference) const {
-  constexpr std::size_t kBlock = Receivers::kBlock;
-  const std::size_t begin = block * kBlock, count = receivers_->slots_in(block);
-  const std::span<const std::uint32_t> patch = std::span(receivers_->patch).subspan(begin, count);
-  for (std::size_t k = 0; k < parts_; ++k) {
-    std::array<std::array<float, kBlock>, kChannelCount> sum{};
-    for (const LightResponse& response : std::span(responses_).first(light_count_)) {
-      if (response.intensity == glm::vec3(0) || response.lit[block] == 0) continue;
-      const float* const mean = &response.irradiance[begin];
-      const float* const at =
-          &response.at_point[(block * receivers_->points_per_patch + k) * kBlock];
-      for (int c = 0; c < kChannelCount; ++c) {
-        const float intensity = response.intensity[c];
-        for (std::size_t e = 0; e < count; ++e) sum[c][e] += intensity * (at[e] - mean[e]);
-      }
-    }
-    for (std::size_t e = 0; e < count; ++e) {
-      const Float3& rho = data_.patches.reflectance[patch[e]];
-      difference[patch[e] * parts_ + k] = {rho[0] * sum[0][e], rho[1] * sum[1][e],
-                                           rho[2] * sum[2][e]};
     }
   }
 }

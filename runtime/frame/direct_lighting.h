@@ -34,12 +34,10 @@ enum class ShadowMethod : std::uint8_t {
 class DirectLighting {
  public:
   /// `data` and `tracer` (over the first surface_count triangles of data.mesh) must outlive the
-  /// object and its copies. With `parts` > 1 the light at the first as many points of each patch is
-  /// kept apart. Throws Error if a setting is out of range, or patches have fewer points than
-  /// parts.
+  /// object and its copies. Throws Error if a setting is out of range.
   DirectLighting(const TransferData& data, const RayTracer& tracer,
                  const DirectLightingSettings& settings = {},
-                 ShadowMethod method = ShadowMethod::kVolumes, std::size_t parts = 1);
+                 ShadowMethod method = ShadowMethod::kVolumes);
   ~DirectLighting();
   DirectLighting(const DirectLighting&);
   DirectLighting& operator=(const DirectLighting&) = delete;
@@ -49,11 +47,6 @@ class DirectLighting {
   /// Error as check_sky does.
   void compute(std::span<const Light> lights, const Sky& sky, std::span<Float3> direct_irradiance,
                const Scheduler& scheduler = {});
-
-  /// Writes what the parts of patches reflect of the lights of the last compute() more than the
-  /// mean of their patch, in lx: [n parts], K i + k for part k of patch i. Does not allocate. Parts
-  /// must be kept apart.
-  void reflect_at_parts(std::span<Float3> difference, const Scheduler& scheduler = {}) const;
 
   /// The number of lights that the last compute() traced: new and changed ones.
   int traced_light_count() const { return traced_light_count_; }
@@ -65,14 +58,12 @@ class DirectLighting {
   void prepare(std::span<const Light> lights);
   void respond(LightResponse& response, std::size_t block) const;
   void add_up(const Sky& sky, std::size_t block, std::span<Float3> direct_irradiance) const;
-  void reflect_at_parts(std::size_t block, std::span<Float3> difference) const;
 
   const TransferData& data_;
   const RayTracer& tracer_;
   std::shared_ptr<const Receivers> receivers_;
   std::shared_ptr<const OccluderGroups> occluders_;
   std::vector<LightResponse> responses_;
-  std::size_t parts_;
   std::size_t light_count_ = 0;  ///< of the current frame; at most the number of responses
   int traced_light_count_ = 0;
 };

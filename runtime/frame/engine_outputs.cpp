@@ -15,8 +15,7 @@ namespace {
 void write_unclamped(const Engine& engine, std::span<Float3> irradiance) {
   const Engine::Parts& parts = engine.parts();
   reconstruct_at_vertices(parts.data->mesh, parts.indirect_irradiance, irradiance, parts.scheduler);
-  parts.receiver_products.add(parts.radiosity, parts.part_difference(), irradiance,
-                              parts.scheduler);
+  parts.receiver_products.add(parts.radiosity, irradiance, parts.scheduler);
 }
 
 }  // namespace

@@ -45,11 +45,8 @@ Engine::Parts::Parts(std::shared_ptr<const TransferData> transfer_data,
       scheduler(settings.scheduler),
       receiver_products(data->receiver_rows, data->patches.area) {
   tracer = std::make_shared<const RayTracer>(make_surface_tracer(data->mesh));
+  direct_lighting = std::make_shared<DirectLighting>(*data, *tracer, settings.direct_lighting);
   const std::size_t n = data->patches.size();
-  const std::size_t parts = data->receiver_rows.parts_per_patch(n);
-  direct_lighting = std::make_shared<DirectLighting>(*data, *tracer, settings.direct_lighting,
-                                                     ShadowMethod::kVolumes, parts);
-  if (parts > 1) difference.resize(n * parts);
   emitting_material =
       std::make_shared<const std::vector<std::uint32_t>>(find_emitting_material(*data));
   emitted_exitance = data->patches.emitted_exitance;
@@ -90,13 +87,6 @@ Engine& Engine::operator=(Engine&& other) noexcept = default;
 void Engine::Parts::compute_direct(std::span<const Light> lights, const Sky& frame_sky) {
   direct_lighting->compute(lights, frame_sky, direct_irradiance, scheduler);
   sky = frame_sky;
-  has_lamps = true;
-}
-
-std::span<const Float3> Engine::Parts::part_difference() const {
-  if (difference.empty() || !has_lamps) return {};
-  direct_lighting->reflect_at_parts(difference, scheduler);
-  return difference;
 }
 
 void Engine::relight(std::span<const Light> lights, const Sky& sky) {
@@ -114,7 +104,6 @@ void Engine::relight(std::span<const Float3> direct_irradiance) {
   check_light_of_patches("the direct irradiance", direct_irradiance);
   std::ranges::copy(direct_irradiance, parts_->direct_irradiance.begin());
   parts_->sky = {};
-  parts_->has_lamps = false;
   parts_->compute_initial_exitance();
   parts_->apply_transfer();
   parts_->compute_radiosity();

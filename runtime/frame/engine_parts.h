@@ -53,10 +53,6 @@ struct Engine::Parts {
   void apply_transfer();
   void compute_radiosity();
 
-  /// What parts of patches shine more than their patch in the last frame (ReceiverProducts), made
-  /// anew at each call. Empty where no rows ask for it or direct light came from the caller.
-  std::span<const Float3> part_difference() const;
-
   mutable EngineUse use;
   std::shared_ptr<const TransferData> data;
   Scheduler scheduler;
@@ -67,13 +63,11 @@ struct Engine::Parts {
   std::vector<Float3> emitted_exitance;
   std::vector<Float3> direct_irradiance, initial_exitance, indirect_irradiance, radiosity;
   std::vector<float> workspace;
-  bool has_lamps = false;  ///< whether the last frame looked at lamps, which light parts of patches
 
   // What outputs of a frame (outputs.h) need to be made.
   std::vector<Float3> vertex_irradiance;  ///< [v] if there is a lightmap
   std::vector<SurfaceLight> patch_light;  ///< [n] if there are surface harmonics
   mutable ReceiverProducts receiver_products;
-  mutable std::vector<Float3> difference;  ///< [n K] if the rows have parts
 };
 
 }  // namespace rebounce

@@ -43,17 +43,15 @@ class LampAtBlock {
  public:
   LampAtBlock(const Receivers& receivers, const RayTracer& tracer, const PreparedLight& lamp,
               const OccluderGroups& occluders, const ShadowVolumes& volumes, std::size_t block,
-              const BlockIrradiance& irradiance)
+              std::span<float> irradiance)
       : receivers_(receivers),
         lamp_(lamp),
         occluders_(occluders),
         volumes_(volumes),
         block_(block),
-        slot_count_(receivers.slots_in(block)),
-        share_(irradiance.point_stride > 0 ? 1
-                                           : 1 / static_cast<float>(receivers.points_per_patch)),
+        share_(1 / static_cast<float>(receivers.points_per_patch)),
         irradiance_(irradiance),
-        shadows_(tracer, irradiance.sum),
+        shadows_(tracer, irradiance),
         reached_(receivers.reached(block, lamp)) {}
 
   void add() {
@@ -90,12 +88,7 @@ class LampAtBlock {
   }
 
   std::size_t slots_end(std::size_t part) const {
-    return std::min(slot_count_, (part + 1) * kPart);
-  }
-
-  /// The sum for point `k` of a slot.
-  std::size_t sum_of(std::size_t slot, std::size_t k) const {
-    return slot + k * irradiance_.point_stride;
+    return std::min(irradiance_.size(), (part + 1) * kPart);
   }
 
   /// Adds the light of a part. `groups`: of occluders, if `between` is kSome.
@@ -162,17 +155,8 @@ class LampAtBlock {
         const float free = depth[e] < 0 ? share : 0.0F;
         sum[e] += free * (arriving > 0 ? arriving : 0.0F);
       }
-      if (irradiance_.point_stride > 0) {
-        put(sum, part, k);
-        sum.fill(0);
-      }
     }
-    if (irradiance_.point_stride == 0) put(sum, part, 0);
-  }
-
-  void put(const Depths& sum, std::size_t part, std::size_t k) const {
-    std::copy_n(sum.begin(), slots_end(part) - part * kPart,
-                &irradiance_.sum[sum_of(part * kPart, k)]);
+    std::copy_n(sum.begin(), slots_end(part) - part * kPart, &irradiance_[part * kPart]);
   }
 
   /// The same, by rays where volumes do not tell.
@@ -192,10 +176,10 @@ class LampAtBlock {
           const Way way = ways[k - first][slot - part * kPart];
           if (arriving[slot] <= 0 || way == Way::kHidden) continue;
           if (way == Way::kFree) {
-            irradiance_.sum[sum_of(slot, k)] += share_ * arriving[slot];
+            irradiance_[slot] += share_ * arriving[slot];
           } else {
             shadows_.add_ray(receivers_.points(block_, k).at(slot), here.at(slot),
-                             share_ * arriving[slot], sum_of(slot, k));
+                             share_ * arriving[slot], slot);
           }
         }
       }
@@ -219,10 +203,10 @@ class LampAtBlock {
       for (std::size_t slot = part * kPart; slot < slots_end(part); ++slot) {
         const std::size_t e = slot - part * kPart;
         if (ways[e] == Way::kFree) {
-          irradiance_.sum[sum_of(slot, k)] += share_ * unoccluded[e];
+          irradiance_[slot] += share_ * unoccluded[e];
         } else if (open[e] > 0) {
           if (before.is_solid && seen[e] >= 0) {
-            irradiance_.sum[sum_of(slot, k)] += share_ * unoccluded[e] * seen[e];
+            irradiance_[slot] += share_ * unoccluded[e] * seen[e];
           } else {
             add_surface(k, slot);
           }
@@ -282,7 +266,7 @@ class LampAtBlock {
     }
     const PatchPointBlock& points = receivers_.points(block_, k);
     shadows_.add_surface(lamp_, {points.at(slot), points.normal_at(slot)},
-                         std::span(places).first(count), share_, sum_of(slot, k));
+                         std::span(places).first(count), share_, slot);
   }
 
   const Receivers& receivers_;
@@ -291,9 +275,8 @@ class LampAtBlock {
   const ShadowVolumes& volumes_;
   const ShadowKernels& kernels_ = shadow_kernels();
   std::size_t block_;
-  std::size_t slot_count_;
-  float share_;  ///< of each point of a patch in a sum
-  BlockIrradiance irradiance_;
+  float share_;  ///< of each point of a patch
+  std::span<float> irradiance_;
   LampShadows shadows_;
   Receivers::Reached reached_;
 };
@@ -302,7 +285,7 @@ class LampAtBlock {
 
 void add_lamp(const Receivers& receivers, const RayTracer& tracer, const PreparedLight& lamp,
               const OccluderGroups& occluders, const ShadowVolumes& volumes, std::size_t block,
-              const BlockIrradiance& irradiance) {
+              std::span<float> irradiance) {
   LampAtBlock(receivers, tracer, lamp, occluders, volumes, block, irradiance).add();
 }
 

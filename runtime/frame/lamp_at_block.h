@@ -12,14 +12,7 @@
 
 namespace rebounce {
 
-/// Sums of a block, in lx. The light at point k of a slot belongs to sum number slot + k x
-/// point_stride: of a stride of 0 sums are the means of patches, else those of each point.
-struct BlockIrradiance {
-  std::span<float> sum;
-  std::size_t point_stride = 0;
-};
-
-/// Adds the irradiance from `lamp` at intensity 1 to that of a block, in lx.
+/// Adds the irradiance from `lamp` at intensity 1 to that of the slots of a block, in lx.
 ///
 /// Shadows come from `volumes`, those of what stands in the scene: points in none of them see the
 /// lamp, and points inside one that is wholly in the shadow see nothing of it. From the others a
@@ -29,6 +22,6 @@ struct BlockIrradiance {
 /// if they are not all that stands in the scene, rays look for the rest. Does not allocate.
 void add_lamp(const Receivers& receivers, const RayTracer& tracer, const PreparedLight& lamp,
               const OccluderGroups& occluders, const ShadowVolumes& volumes, std::size_t block,
-              const BlockIrradiance& irradiance);
+              std::span<float> irradiance);
 
 }  // namespace rebounce

@@ -341,19 +341,16 @@ class Checker {
     const ReceiverRows& rows_of = data_.receiver_rows;
     if (rows_of.empty()) return;
     const std::size_t n = data_.patches.size(), entries = rows_of.entry_set.size();
-    if (rows_of.part.empty() || rows_of.part.size() % n != 0) {
-      refuse("receiver.part", std::to_string(rows_of.part.size()) + " rows, no multiple of " +
-                                  std::to_string(n) + " patches");
-    }
+    rows("receiver.patch", rows_of.patch.size(), n);
     rows("receiver.scale", rows_of.scale.size(), entries);
     rows("receiver.vertex", rows_of.vertex.size(), ReceiverRows::kGroup * rows_of.group_count());
     rows(tensor::kReceiverValue, rows_of.value.size(), ReceiverRows::kGroup * entries);
     numbers("receiver.scale", rows_of.scale, kNotNegative);
-    each_once("receiver.part", rows_of.part, rows_of.part.size());
+    each_once("receiver.patch", rows_of.patch, n);
     each_once("receiver.vertex", rows_of.vertex, data_.mesh.position.size(), kNone);
     for (std::size_t k = 0; k < rows_of.set.size(); ++k) {
       const auto [begin, end] = rows_of.set[k];
-      if (begin >= end || end > rows_of.part.size())
+      if (begin >= end || end > n)
         refuse("receiver.set", "entry " + std::to_string(k) + " is empty");
     }
     for (std::size_t e = 0; e < entries; ++e) {

@@ -181,7 +181,7 @@ void visit_tensors_of_lightmap(Map& map, Visit&& visit) {
 template <typename Rows, typename Visit>
 void visit_tensors_of_receiver_rows(Rows& rows, Visit&& visit) {
   visit(tensor::kReceiverBegin, rows.group_begin);
-  visit("receiver.part", rows.part);
+  visit("receiver.patch", rows.patch);
   visit("receiver.set", rows.set);
   visit("receiver.entry_set", rows.entry_set);
   visit("receiver.scale", rows.scale);

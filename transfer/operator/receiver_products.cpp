@@ -1,7 +1,5 @@
 #include "transfer/operator/receiver_products.h"
 
-#include <cassert>
-
 #include "transfer/format/channel_lanes.h"
 #include "transfer/kernels/kernels.h"
 
@@ -13,39 +11,32 @@ constexpr std::size_t kSetsPerTask = 1024, kGroupsPerTask = 4;
 }  // namespace
 
 ReceiverProducts::ReceiverProducts(const ReceiverRows& rows, std::span<const float> area)
-    : rows_(&rows) {
+    : rows_(&rows), area_(area) {
   if (rows.empty()) return;
-  const std::size_t of_patch = rows.parts_per_patch(area.size());
-  flux_.resize(rows.part.size() + 1);
+  flux_.resize(rows.patch.size() + 1);
   set_light_.resize(rows.set.size());
-  std::vector<double> before{0.0};
-  for (const std::uint32_t p : rows.part) {
-    const auto patch = static_cast<std::uint32_t>(p / of_patch);
-    part_.push_back({patch, static_cast<double>(area[patch]) / static_cast<double>(of_patch)});
-    before.push_back(before.back() + part_.back().area);
+  std::vector<double> before(rows.patch.size() + 1, 0.0);
+  for (std::size_t k = 0; k < rows.patch.size(); ++k) {
+    before[k + 1] = before[k] + static_cast<double>(area[rows.patch[k]]);
   }
   for (const auto& [begin, end] : rows.set) {
     inverse_area_.push_back(1 / (before[end] - before[begin]));
   }
 }
 
-void ReceiverProducts::add(std::span<const Float3> radiosity, std::span<const Float3> difference,
-                           std::span<Float3> irradiance, const Scheduler& scheduler) {
+void ReceiverProducts::add(std::span<const Float3> radiosity, std::span<Float3> irradiance,
+                           const Scheduler& scheduler) {
   if (rows_->empty()) return;
-  average_sets(radiosity, difference, scheduler);
+  average_sets(radiosity, scheduler);
   parallel_for_pieces(scheduler, rows_->group_count(), kGroupsPerTask,
                       [&](std::size_t g) { add_group(g, irradiance); });
 }
 
-void ReceiverProducts::average_sets(std::span<const Float3> radiosity,
-                                    std::span<const Float3> difference,
-                                    const Scheduler& scheduler) {
-  assert(difference.empty() || difference.size() == part_.size());
-  for (std::size_t k = 0; k < part_.size(); ++k) {
-    const auto& [patch, area] = part_[k];
-    const Float3 more = difference.empty() ? Float3{0, 0, 0} : difference[rows_->part[k]];
+void ReceiverProducts::average_sets(std::span<const Float3> radiosity, const Scheduler& scheduler) {
+  for (std::size_t k = 0; k < rows_->patch.size(); ++k) {
+    const std::uint32_t i = rows_->patch[k];
     for (std::size_t c = 0; c < kChannelCount; ++c) {
-      flux_[k + 1][c] = flux_[k][c] + area * (static_cast<double>(radiosity[patch][c]) + more[c]);
+      flux_[k + 1][c] = flux_[k][c] + static_cast<double>(area_[i]) * radiosity[i][c];
     }
   }
   parallel_for_pieces(scheduler, set_light_.size(), kSetsPerTask, [&](std::size_t k) {

@@ -101,10 +101,6 @@ struct ReceiverRowSettings {
   /// Sets of patches that a group of 64 vertices has at most, from 4 to 1024. A vertex takes 9/8
   /// bytes for each, and 4 more.
   std::uint32_t most_sets = 128;
-  /// Parts of a patch of which rows tell the direct light apart, from 1 to 64: engines look at
-  /// lamps at one point of each, at least. More: rows know which part of a patch a lamp lights. It
-  /// needs more sets, 256 at least, and offline time grows; beyond 8 that of frames does too.
-  int parts_per_patch = 1;  // lab/120: with 128 sets more parts gain nothing
 };
 
 /// The default of BuildSettings::tolerance.

@@ -3,7 +3,6 @@
 #include <string>
 
 #include "rebounce/error.h"
-#include "runtime/frame/engine_parts.h"
 #include "runtime/lights/sky_light.h"
 #include "runtime/rays/float3_glm.h"
 #include "transfer/operator/receiver_products.h"
@@ -45,7 +44,6 @@ VertexLight light_at_vertices(const TransferData& data, const PictureLight& ligh
   check_length(light.indirect_irradiance.size(), n, "indirect_irradiance");
   check_length(light.emitted_irradiance.size(), n, "emitted_irradiance");
   check_length(light.reflected_exitance.size(), n, "reflected_exitance");
-  check_length(light.part_difference.size(), data.receiver_rows.part.size(), "part_difference");
   check_sky(light.sky, data);
   std::vector<glm::vec3> sky(n), bounced(n, glm::vec3(0));
   for (std::size_t i = 0; i < n; ++i) {
@@ -58,8 +56,7 @@ VertexLight light_at_vertices(const TransferData& data, const PictureLight& ligh
   VertexLight at_vertices{reconstruct_at_vertices(data.mesh, sky), {}};
   std::vector<Float3> value = mixed(data.mesh, bounced);
   if (!light.reflected_exitance.empty()) {
-    ReceiverProducts(data.receiver_rows, data.patches.area)
-        .add(light.reflected_exitance, light.part_difference, value);
+    ReceiverProducts(data.receiver_rows, data.patches.area).add(light.reflected_exitance, value);
   }
   at_vertices.bounced = clamped(value);
   return at_vertices;
@@ -73,12 +70,6 @@ std::vector<Float3> reflected_exitance(const Engine& engine) {
     }
   }
   return reflected;
-}
-
-std::vector<Float3> part_difference(const Engine& engine) {
-  const OneThread guard(engine.parts().use);
-  const std::span<const Float3> difference = engine.parts().part_difference();
-  return {difference.begin(), difference.end()};
 }
 
 std::vector<glm::vec3> reconstruct_at_vertices(const DisplayMesh& mesh,

@@ -22,16 +22,11 @@ struct PictureLight {
   /// B - M_e in lx: what patches reflect. Rows of vertices add their part of it; without it they
   /// are left out.
   std::span<const Float3> reflected_exitance{};
-  std::span<const Float3> part_difference{};  ///< [n K] or none, likewise (part_difference below)
-  std::span<const float> error{};             ///< >= 0, drawn by Show::kError
+  std::span<const float> error{};  ///< >= 0, drawn by Show::kError
 };
 
 /// B - M_e [n] in lx of the last frame.
 std::vector<Float3> reflected_exitance(const Engine& engine);
-
-/// What parts of patches shine more than their patch in the last frame, in lx: [n K] if rows of
-/// vertices ask for it, else empty.
-std::vector<Float3> part_difference(const Engine& engine);
 
 /// The light of one picture as values at the vertices [v], in lx.
 struct VertexLight {

@@ -18,14 +18,12 @@ namespace rebounce {
 
 struct DirectLightingSettings {
   /// Points of a patch at which lamps are looked at. More: softer, truer shadow borders; time grows
-  /// in proportion. At least 1; if rows of vertices tell parts of patches apart, at least as many
-  /// as these (precompute --receiver-parts).
+  /// in proportion. At least 1.
   int points_per_patch = 8;
   /// Places of a lamp with a surface that each point looks at, from 1 to 64. More: smoother half
   /// shadows; time of such lamps grows in proportion.
   int area_light_samples = 4;
-  /// Lights for which room is made at once: 5 bytes per patch and light, and 4 more for each point
-  /// if rows of vertices have parts of patches. A frame that has more
+  /// Lights for which room is made at once: 5 bytes per patch and light. A frame that has more
   /// makes the room it lacks, the only time that one allocates. At least 0.
   int light_capacity = 16;
 };
@@ -80,9 +78,8 @@ class Engine {
   void relight(std::span<const Light> lights, const Sky& sky);
 
   /// One frame with a direct irradiance [n] in lx that the caller brings, from shadow maps for
-  /// instance; its sky is dark, and rows of vertices take patches as evenly lit. Throws Error if
-  /// the size is wrong or a number is negative or not finite, with the index of the patch; the last
-  /// frame then stays.
+  /// instance; its sky is dark. Throws Error if the size is wrong or a number is negative or not
+  /// finite, with the index of the patch; the last frame then stays.
   void relight(std::span<const Float3> direct_irradiance);
 
   /// From the next frame on, what the surfaces of material `material` emit is that of the scene

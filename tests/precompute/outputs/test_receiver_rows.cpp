@@ -3,14 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 
 #include "precompute/build/transfer_build.h"
 #include "precompute/outputs/receiver_sets.h"
 #include "precompute/outputs/receiver_views.h"
-#include "precompute/outputs/sensor_view.h"
-#include "precompute/patches/hit_patch.h"
-#include "precompute/sampling/hemisphere_rays.h"
 #include "rebounce/outputs.h"
 #include "runtime/outputs/vertex_light.h"
 #include "runtime/rays/triangle.h"
@@ -37,9 +33,8 @@ Scene room_of_small_things() {
   return scene;
 }
 
-TransferData build(bool with_rows, double tolerance = 0.01, int parts = 1) {
+TransferData build(bool with_rows, double tolerance = 0.01) {
   BuildSettings settings;
-  settings.receiver_rows.parts_per_patch = parts;
   settings.subdivision.patch_count = 60;
   settings.form_factors = with_quality(FormFactorQuality::kLow);
   settings.receiver_rows.at_vertices = with_rows;
@@ -54,12 +49,6 @@ const std::shared_ptr<const TransferData>& room() {
   return data;
 }
 
-/// The same, where rows tell eight parts of each patch apart.
-const std::shared_ptr<const TransferData>& room_of_parts() {
-  static const auto data = std::make_shared<const TransferData>(build(true, 0.01, 8));
-  return data;
-}
-
 Light lamp() {
   Light light;
   light.position = {0.4F, 1.9F, 0.5F};
@@ -67,44 +56,9 @@ Light lamp() {
   return light;
 }
 
-/// The irradiance at a place from patches on which the light of a lamp is looked for where rays
-/// end.
-glm::dvec3 irradiance_of_lit_places(const Engine& engine, const Light& lamp, const Float3& origin,
-                                    const Float3& normal) {
-  constexpr std::uint32_t kRays = 1024;
-  const TransferData& data = engine.data();
-  const RayTracer& tracer = *engine.parts().tracer;
-  const std::vector<PatchPoint> from(kRays, {origin, normal});
-  std::vector<Ray> rays(kRays);
-  std::vector<Hit> hits(kRays);
-  make_hemisphere_rays(from, tracer, {0.3, 0.7}, rays);
-  tracer.intersect(rays, hits);
-  std::vector<Float3> position, normals;
-  std::vector<std::uint32_t> patch;
-  for (const Hit& hit : hits) {
-    const std::uint32_t i = patch_at(data.mesh, data.mesh.triangle_patch, hit);
-    if (i == kNone) continue;
-    const TriangleCorners corners = corners_of(data.mesh, hit.triangle);
-    patch.push_back(i);
-    position.push_back(to_float3(point_at(corners, {hit.u, hit.v})));
-    normals.push_back(to_float3(hit.front ? front_normal(corners) : -front_normal(corners)));
-  }
-  std::vector<Float3> there(patch.size(), Float3{0, 0, 0});
-  add_direct_irradiance(tracer, lamp, position, normals, 1, there);
-  glm::dvec3 sum(0);
-  for (std::size_t k = 0; k < patch.size(); ++k) {
-    sum += to_dvec3(data.patches.reflectance[patch[k]]) *
-           (to_dvec3(engine.indirect_irradiance()[patch[k]]) + to_dvec3(there[k]));
-  }
-  return sum / static_cast<double>(kRays);
-}
-
-using TruthAt = std::function<glm::dvec3(const Float3& place, const Float3& normal)>;
-
 /// The error of values at vertices of the boxes, interpolated in the middles of triangles, against
-/// rays that bring the radiosity of the patches they meet, or another `truth_at`.
-double error_against_rays(const Engine& engine, std::span<const Float3> at_vertices,
-                          const TruthAt& truth_at = {}) {
+/// rays that bring the radiosity of the patches they meet.
+double error_against_rays(const Engine& engine, std::span<const Float3> at_vertices) {
   const DisplayMesh& mesh = engine.data().mesh;
   double off = 0, all = 0;
   for (std::uint32_t t = 0; t < mesh.surface_count(); ++t) {
@@ -113,10 +67,8 @@ double error_against_rays(const Engine& engine, std::span<const Float3> at_verti
     const Float3 normal = to_float3(front_normal(corners));
     if (mesh.triangle_material[t] != 1) continue;
     const Float3 middle = to_float3((corners[0] + corners[1] + corners[2]) / 3.0);
-    const glm::dvec3 truth =
-        truth_at ? truth_at(middle, normal)
-                 : test::irradiance_at(engine, engine.parts().tracer->offset_point(middle, normal),
-                                       normal, 1024);
+    const glm::dvec3 truth = test::irradiance_at(
+        engine, engine.parts().tracer->offset_point(middle, normal), normal, 1024);
     glm::dvec3 shown(0);
     for (const std::uint32_t v : mesh.triangle[t]) shown += to_dvec3(at_vertices[v]) / 3.0;
     off += area_of(corners) * glm::dot(shown - truth, shown - truth);
@@ -138,57 +90,13 @@ TEST(ReceiverRows, AreNearerToRaysThanWeights) {
   EXPECT_LT(with_rows, 0.8 * with_weights);
 }
 
-TEST(ReceiverRows, PartsTellWhereALampLightsPatches) {
-  // Between the boxes and the lamp: patches of the floor are lit in part.
-  Light light = lamp();
-  light.position = {1.4F, 0.5F, 1.6F};
-  const auto error_with = [&](const std::shared_ptr<const TransferData>& data) {
-    Engine engine(data);
-    engine.relight({&light, 1}, {});
-    std::vector<Float3> rows(data->mesh.position.size());
-    vertex_irradiance(engine, rows);
-    return error_against_rays(engine, rows, [&](const Float3& place, const Float3& normal) {
-      return irradiance_of_lit_places(engine, light, place, normal);
-    });
-  };
-  const double of_parts = error_with(room_of_parts()), of_patches = error_with(room());
-  std::printf("relative L2 error: %.4f with parts, %.4f by patches\n", of_parts, of_patches);
-  EXPECT_LT(of_parts, 0.7 * of_patches);
-}
-
-TEST(ReceiverRows, LightOfTheCallerIsEvenOnPatches) {
-  Engine engine(room_of_parts());
-  const Light light = lamp();
-  engine.relight({&light, 1}, {});
-  std::vector<Float3> of_lamp(room_of_parts()->mesh.position.size()), even = of_lamp,
-                                                                      expected = of_lamp;
-  vertex_irradiance(engine, of_lamp);
-  const std::vector<Float3> direct(engine.direct_irradiance().begin(),
-                                   engine.direct_irradiance().end());
-  engine.relight(direct);
-  vertex_irradiance(engine, even);
-  EXPECT_NE(even, of_lamp);
-  reconstruct_at_vertices(room_of_parts()->mesh, engine.indirect_irradiance(), expected);
-  ReceiverProducts(room_of_parts()->receiver_rows, room_of_parts()->patches.area)
-      .add(engine.radiosity(), {}, expected);
-  clamp_light(expected);
-  EXPECT_EQ(even, expected);
-}
-
-TEST(ReceiverRows, AnEngineWithFewerPointsThanPartsIsRefused) {
-  test::expect_error([] { Engine(room_of_parts(), {.direct_lighting = {.points_per_patch = 4}}); },
-                     "4 points of a patch does not tell its 8 parts");
-}
-
 TEST(ReceiverRows, AddNothingUnderEvenLight) {
-  for (const auto& data : {room(), room_of_parts()}) {
-    const ReceiverRows& rows = data->receiver_rows;
-    ASSERT_GT(rows.group_count(), 0U);
-    const std::vector<Float3> even(data->patches.size(), Float3{1, 1, 1});
-    std::vector<Float3> added(data->mesh.position.size(), Float3{0, 0, 0});
-    ReceiverProducts(rows, data->patches.area).add(even, {}, added);
-    for (const Float3& a : added) EXPECT_NEAR(a[0], 0, 1e-3);
-  }
+  const ReceiverRows& rows = room()->receiver_rows;
+  ASSERT_GT(rows.group_count(), 0U);
+  const std::vector<Float3> even(room()->patches.size(), Float3{1, 1, 1});
+  std::vector<Float3> added(room()->mesh.position.size(), Float3{0, 0, 0});
+  ReceiverProducts(rows, room()->patches.area).add(even, added);
+  for (const Float3& a : added) EXPECT_NEAR(a[0], 0, 1e-3);
 }
 
 TEST(ReceiverRows, ChangeNothingElse) {
@@ -210,9 +118,8 @@ TEST(ReceiverRows, ChangeNothingElse) {
 }
 
 TEST(ReceiverRows, AreTheSameOnAnyNumberOfThreads) {
-  const auto build_parts = [] { return build(true, 0.01, 4); };
-  const TransferData again = test::with_threads(1, build_parts);
-  const TransferData more = test::with_threads(4, build_parts);
+  const TransferData again = test::with_threads(1, [] { return build(true); });
+  const TransferData more = test::with_threads(4, [] { return build(true); });
   EXPECT_EQ(again.receiver_rows.value, more.receiver_rows.value);
   EXPECT_EQ(again.receiver_rows.scale, more.receiver_rows.scale);
   EXPECT_EQ(again.receiver_rows.vertex, more.receiver_rows.vertex);
@@ -221,17 +128,15 @@ TEST(ReceiverRows, AreTheSameOnAnyNumberOfThreads) {
 }
 
 TEST(ReceiverRows, AFrameWithThemDoesNotAllocate) {
-  for (const auto& data : {room(), room_of_parts()}) {
-    Engine engine(data);
-    const Light light = lamp();
-    std::vector<Float3> shown(data->mesh.position.size());
-    engine.relight({&light, 1}, {});
-    EXPECT_EQ(test::count_allocations([&] {
-                engine.relight({&light, 1}, {});
-                vertex_irradiance(engine, shown);
-              }),
-              0);
-  }
+  Engine engine(room());
+  const Light light = lamp();
+  std::vector<Float3> shown(room()->mesh.position.size());
+  engine.relight({&light, 1}, {});
+  EXPECT_EQ(test::count_allocations([&] {
+              engine.relight({&light, 1}, {});
+              vertex_irradiance(engine, shown);
+            }),
+            0);
 }
 
 TEST(ReceiverRows, AreOnlyStoredWhereTheyAddMoreThanTheTolerance) {
@@ -249,8 +154,6 @@ TEST(ReceiverRows, RefuseWhatCannotBe) {
   test::expect_error([&] { make(data, {.tolerance = NAN}); }, "tolerance");
   test::expect_error([&] { make(data, {.most_sets = 3}); }, "from 4");
   test::expect_error([&] { make(data, {.most_sets = 1025}); }, "1024");
-  test::expect_error([&] { make(data, {.parts_per_patch = 0}); }, "from 1 to 64 parts");
-  test::expect_error([&] { make(data, {.parts_per_patch = 65}); }, "from 1 to 64 parts");
   TransferData without = data;
   without.transfer = nullptr;
   test::expect_error([&] { make(without, {}); }, "need an operator");
@@ -272,8 +175,7 @@ struct Shelf {
   /// The part of patch `seen` in the row of the vertex at the corner `x` of the floor.
   float part(float x, std::uint32_t seen) const {
     const RayTracer tracer = make_surface_tracer(mesh);
-    const std::vector<ReceiverPoint> point(3);
-    ReceiverViewer viewer(mesh, mesh.triangle_patch, 3, point, tracer, 4096);
+    ReceiverViewer viewer(mesh, mesh.triangle_patch, 3, tracer, 4096);
     std::uint32_t vertex = 0;
     std::vector<std::uint32_t> around;
     for (std::uint32_t t = 0; t < 4; ++t) {
@@ -285,8 +187,8 @@ struct Shelf {
     }
     ViewRow row;
     viewer.look_from_vertex(vertex, around, 1, row);
-    for (const auto& [source, part] : row) {
-      if (source == seen) return part;
+    for (const auto& [patch, part] : row) {
+      if (patch == seen) return part;
     }
     return 0;
   }

@@ -5,7 +5,6 @@
 #include <numbers>
 
 #include "rebounce/error.h"
-#include "tests/support/expect_error.h"
 #include "tests/support/test_scene_data.h"
 #include "tests/support/with_threads.h"
 
@@ -199,100 +198,6 @@ TEST(DirectLighting, NeedsAPoint) {
   EXPECT_THROW(DirectLighting(data, tracer, {.points_per_patch = 0}), Error);
   EXPECT_THROW(DirectLighting(data, tracer, {.area_light_samples = 0}), Error);
   EXPECT_THROW(DirectLighting(data, tracer, {.area_light_samples = 65}), Error);
-}
-
-/// Coarse floor in the shadow of a small square, under lamps of all kinds.
-struct HalfShadows {
-  TransferData data;
-  std::vector<Light> lights;
-
-  HalfShadows() {
-    test::add_square(data, 2, 0, 5, true, {0.5F, 0.25F, 0.8F});
-    test::add_square(data, 0.5F, 1, 1, true, {0.5F, 0.5F, 0.5F});
-    const auto add = [&](LightType type) -> Light& {
-      Light& light = lights.emplace_back();
-      light.type = type;
-      light.position = {0.3F, 2, -0.2F};
-      light.direction = {0.1F, -1, 0.2F};
-      light.color = {1, 0.5F, 0.25F};
-      return light;
-    };
-    add(LightType::kPoint);
-    add(LightType::kSpot);
-    add(LightType::kDirectional);
-    add(LightType::kSphere).radius = 0.1F;
-  }
-};
-
-TEST(DirectLighting, PartsOfPatchesAreLitAsTheirPoints) {
-  const HalfShadows scene;
-  const RayTracer tracer = make_surface_tracer(scene.data.mesh);
-  constexpr std::size_t kParts = 8;
-  const std::size_t n = scene.data.patches.size();
-  for (const ShadowMethod method : {ShadowMethod::kVolumes, ShadowMethod::kRays}) {
-    DirectLighting plain(scene.data, tracer, {}, method);
-    DirectLighting apart(scene.data, tracer, {}, method, kParts);
-    // A light alone, then with those whose light is kept.
-    for (std::size_t count = 1; count <= scene.lights.size(); ++count) {
-      const std::span lights = std::span(scene.lights).first(count);
-      std::vector<Float3> whole(n), mean(n), difference(n * kParts);
-      plain.compute(lights, {}, whole);
-      apart.compute(lights, {}, mean);
-      apart.reflect_at_parts(difference);
-      int partly = 0;
-      for (std::size_t i = 0; i < n; ++i) {
-        double sum = 0;
-        float most = 0;
-        for (std::size_t k = 0; k < kParts; ++k) {
-          const Float3& d = difference[i * kParts + k];
-          sum += d[0];
-          most = std::max(most, std::abs(d[0]));
-          // Nothing is below 0.
-          EXPECT_GE(d[0] + 0.5F * mean[i][0], -1e-6F);
-        }
-        EXPECT_NEAR(mean[i][0], whole[i][0], 1e-6 + 1e-5 * whole[i][0]);
-        EXPECT_NEAR(sum, 0, 1e-5);
-        if (most > 0.2F * mean[i][0]) ++partly;
-      }
-      EXPECT_GT(partly, 2);
-    }
-  }
-}
-
-TEST(DirectLighting, APartInShadowReflectsNothing) {
-  const HalfShadows scene;
-  const RayTracer tracer = make_surface_tracer(scene.data.mesh);
-  constexpr std::size_t kParts = 8;
-  const std::size_t n = scene.data.patches.size();
-  DirectLighting apart(scene.data, tracer, {}, ShadowMethod::kVolumes, kParts);
-  std::vector<Float3> mean(n), difference(n * kParts);
-  const Light& lamp = scene.lights[0];
-  apart.compute({&lamp, 1}, {}, mean);
-  apart.reflect_at_parts(difference);
-  const std::vector<ReceiverPoint> point = receiver_points(scene.data);
-  int dark = 0;
-  for (std::size_t p = 0; p < difference.size(); ++p) {
-    const glm::dvec3 way = to_dvec3(lamp.position) - to_dvec3(point[p].position);
-    const double square = glm::dot(way, way);
-    const double facing = glm::dot(way, to_dvec3(point[p].normal)) / std::sqrt(square);
-    const Float3& rho = scene.data.patches.reflectance[p / kParts];
-    const double shown = difference[p][0] + static_cast<double>(rho[0]) * mean[p / kParts][0];
-    const double free = rho[0] * std::max(facing, 0.0) / square;
-    // All of it or none.
-    EXPECT_LT(std::min(std::abs(shown), std::abs(shown - free)), 1e-5);
-    if (free > 0 && shown < 0.5 * free) ++dark;
-  }
-  EXPECT_GT(dark, 5);
-}
-
-TEST(DirectLighting, RefusesMorePartsThanPoints) {
-  const HalfShadows scene;
-  const RayTracer tracer = make_surface_tracer(scene.data.mesh);
-  test::expect_error(
-      [&] {
-        DirectLighting(scene.data, tracer, {.points_per_patch = 7}, ShadowMethod::kVolumes, 8);
-      },
-      "7 points of a patch does not tell its 8 parts");
 }
 
 }  // namespace

@@ -113,16 +113,15 @@ TEST(TransferFile, RefusesImpossibleRowsOfReceivers) {
     };
   };
   expect_refused({
-      {"receiver.part: 5 rows, no multiple of 3 patches", rows([](auto& r) { r.part.pop_back(); })},
-      {"receiver.part: 0 rows", rows([](auto& r) { r.part.clear(); })},
-      {"receiver.part: entry 1 is 6, not below 6", rows([](auto& r) { r.part[1] = 6; })},
-      {"receiver.part: entry 1 is 2, not there for the first time",
-       rows([](auto& r) { r.part[1] = 2; })},
+      {"receiver.patch: 2 rows, not 3", rows([](auto& r) { r.patch.pop_back(); })},
+      {"receiver.patch: entry 1 is 3, not below 3", rows([](auto& r) { r.patch[1] = 3; })},
+      {"receiver.patch: entry 1 is 2, not there for the first time",
+       rows([](auto& r) { r.patch[1] = 2; })},
       {"receiver.set: entry 1 is empty", rows([](auto& r) {
          r.set[1] = {2, 2};
        })},
       {"receiver.set: entry 0", rows([](auto& r) {
-         r.set[0] = {1, 7};
+         r.set[0] = {1, 4};
        })},
       {"receiver.entry_set: entry 2 is 2, not below 2", rows([](auto& r) { r.entry_set[2] = 2; })},
       {"receiver.scale: entry 0", rows([](auto& r) { r.scale[0] = kNan; })},

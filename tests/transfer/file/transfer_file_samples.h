@@ -180,8 +180,8 @@ inline SurfaceHarmonics sample_surface_harmonics() {
 /// Two groups, of 4 and of no sets.
 inline ReceiverRows sample_receiver_rows() {
   ReceiverRows rows;
-  rows.part = {2, 0, 1, 5, 3, 4};
-  rows.set = {{0, 2}, {2, 6}};
+  rows.patch = {2, 0, 1};
+  rows.set = {{0, 2}, {2, 3}};
   rows.group_begin = {0, 4, 4};
   rows.entry_set = {0, 1, 1, 0};
   rows.scale = {0.5F, 0.25F, 0, 1};
@@ -316,7 +316,7 @@ inline void expect_equal(const Lightmap& a, const Lightmap& b) {
 }
 
 inline void expect_equal(const ReceiverRows& a, const ReceiverRows& b) {
-  expect_same(a, b, &ReceiverRows::part, &ReceiverRows::set, &ReceiverRows::group_begin,
+  expect_same(a, b, &ReceiverRows::patch, &ReceiverRows::set, &ReceiverRows::group_begin,
               &ReceiverRows::entry_set, &ReceiverRows::scale, &ReceiverRows::vertex,
               &ReceiverRows::value);
 }

@@ -12,13 +12,13 @@
 namespace rebounce::test_receiver_products {
 namespace {
 
-constexpr std::size_t kPatches = 100, kParts = 3, kGroups = 9;
+constexpr std::size_t kPatches = 300, kGroups = 9;
 constexpr std::uint32_t kGroup = ReceiverRows::kGroup;
 
 struct Sample {
   ReceiverRows rows;
   std::vector<float> area;
-  std::vector<Float3> radiosity, difference, light;
+  std::vector<Float3> radiosity, light;
 };
 
 Sample make_sample(std::uint32_t seed) {
@@ -27,13 +27,13 @@ Sample make_sample(std::uint32_t seed) {
   std::uniform_int_distribution<int> byte(-127, 127);
   Sample sample;
   ReceiverRows& rows = sample.rows;
-  rows.part.resize(kPatches * kParts);
-  std::iota(rows.part.begin(), rows.part.end(), 0U);
-  std::ranges::shuffle(rows.part, random);
+  rows.patch.resize(kPatches);
+  std::iota(rows.patch.begin(), rows.patch.end(), 0U);
+  std::ranges::shuffle(rows.patch, random);
   for (std::uint32_t k = 0; k < 100; ++k) {
-    const auto begin = static_cast<std::uint32_t>(random() % rows.part.size());
+    const auto begin = static_cast<std::uint32_t>(random() % kPatches);
     rows.set.push_back(
-        {begin, begin + 1 + static_cast<std::uint32_t>(random() % (rows.part.size() - begin))});
+        {begin, begin + 1 + static_cast<std::uint32_t>(random() % (kPatches - begin))});
   }
   rows.group_begin = {0};
   rows.vertex.resize(kGroups * kGroup, kNone);
@@ -58,9 +58,6 @@ Sample make_sample(std::uint32_t seed) {
     sample.area.push_back(number(random));
     sample.radiosity.push_back({number(random), 10 * number(random), 100 * number(random)});
   }
-  for (std::size_t p = 0; p < rows.part.size(); ++p) {
-    sample.difference.push_back({number(random) - 1, number(random), -20 * number(random)});
-  }
   sample.light.assign(kGroups * kGroup, Float3{1, 2, 3});
   return sample;
 }
@@ -73,11 +70,10 @@ std::vector<std::array<double, 3>> plain_sums(const Sample& sample) {
     std::array<double, 3> flux{};
     double area = 0;
     for (std::uint32_t k = begin; k < end; ++k) {
-      const std::uint32_t p = rows.part[k], i = p / kParts;
+      const std::uint32_t i = rows.patch[k];
       area += sample.area[i];
       for (std::size_t c = 0; c < 3; ++c) {
-        flux[c] += static_cast<double>(sample.area[i]) *
-                   (static_cast<double>(sample.radiosity[i][c]) + sample.difference[p][c]);
+        flux[c] += static_cast<double>(sample.area[i]) * sample.radiosity[i][c];
       }
     }
     for (double& f : flux) f /= area;
@@ -108,7 +104,7 @@ TEST(ReceiverProducts, AddWhatTheFormatSays) {
   for (const auto& t : truth) {
     for (std::size_t c = 0; c < 3; ++c) largest[c] = std::max(largest[c], std::abs(t[c]));
   }
-  ReceiverProducts(sample.rows, sample.area).add(sample.radiosity, sample.difference, sample.light);
+  ReceiverProducts(sample.rows, sample.area).add(sample.radiosity, sample.light);
   int changed = 0;
   for (std::size_t v = 0; v < truth.size(); ++v) {
     for (std::size_t c = 0; c < 3; ++c) {
@@ -123,29 +119,18 @@ TEST(ReceiverProducts, GiveTheSameBitsOnThreadsWithoutAllocating) {
   Sample sample = make_sample(5);
   ReceiverProducts products(sample.rows, sample.area);
   std::vector<Float3> once = sample.light, again = sample.light;
-  EXPECT_EQ(
-      test::count_allocations([&] { products.add(sample.radiosity, sample.difference, once); }), 0);
+  EXPECT_EQ(test::count_allocations([&] { products.add(sample.radiosity, once); }), 0);
   test::ThreadPool pool(4);
-  products.add(sample.radiosity, sample.difference, again, pool.scheduler());
+  products.add(sample.radiosity, again, pool.scheduler());
   EXPECT_EQ(once, again);
   EXPECT_NE(once, sample.light);
-}
-
-TEST(ReceiverProducts, PartsShineAsTheirPatchesWithoutDifferences) {
-  Sample sample = make_sample(7);
-  std::vector<Float3> zero = sample.light, none = sample.light;
-  sample.difference.assign(sample.difference.size(), Float3{0, 0, 0});
-  ReceiverProducts products(sample.rows, sample.area);
-  products.add(sample.radiosity, sample.difference, zero);
-  products.add(sample.radiosity, {}, none);
-  EXPECT_EQ(zero, none);
 }
 
 TEST(ReceiverProducts, WithoutRowsNothingIsAdded) {
   Sample sample = make_sample(5);
   const ReceiverRows none;
   std::vector<Float3> light = sample.light;
-  ReceiverProducts(none, sample.area).add(sample.radiosity, {}, light);
+  ReceiverProducts(none, sample.area).add(sample.radiosity, light);
   EXPECT_EQ(light, sample.light);
 }
 

@@ -147,11 +147,9 @@ struct DisplayMesh {
 };
 
 /// What vertices of the display mesh receive beyond their reconstruction weights: rows of their
-/// own, as the difference from those of their patches. Each patch has K parts of equal area, of
-/// which the direct light is told apart: part k is what is nearest to point k of its
-/// receiver_points. A row is by sets of parts, each taken as if it shone evenly: set k has the
-/// parts at the positions [set[k][0], set[k][1]) of `part`, and its light x is their radiosity in
-/// lx, averaged over their area.
+/// own, as the difference from those of their patches. A row is by sets of patches, each taken as
+/// if it shone evenly: set k has the patches at the positions [set[k][0], set[k][1]) of `patch`,
+/// and its light x is their radiosity in lx, averaged over their area.
 ///
 /// Vertices are in groups of kGroup. All of a group see the same sets; set j of group g is entry
 /// e = group_begin[g] + j. To vertex number i of the group it adds value x scale[e] x its light, in
@@ -161,7 +159,7 @@ struct ReceiverRows {
   static constexpr std::uint32_t kSetStep = 4;      ///< the sets of a group are a multiple of this
   static constexpr std::uint32_t kMostSets = 1024;  ///< of a group
 
-  std::vector<std::uint32_t> part;  ///< [n K] a permutation; K i + k is part k of patch i
+  std::vector<std::uint32_t> patch;               ///< [n] a permutation
   std::vector<std::array<std::uint32_t, 2>> set;  ///< [m]
   std::vector<std::uint32_t> group_begin;         ///< [g + 1] of entries
   std::vector<std::uint32_t> entry_set;           ///< [q]
@@ -172,11 +170,6 @@ struct ReceiverRows {
 
   bool empty() const { return group_begin.empty(); }
   std::size_t group_count() const { return empty() ? 0 : group_begin.size() - 1; }
-
-  /// K, of a scene of this many patches; 1 without rows.
-  std::size_t parts_per_patch(std::size_t patch_count) const {
-    return empty() ? 1 : part.size() / patch_count;
-  }
 
   /// Entries by fours, within them vertices by fours, as integer bases are (operator_format.h).
   static constexpr std::size_t value_index(std::size_t entry, std::size_t vertex_in_group) {

@@ -94,11 +94,9 @@ std::vector<glm::vec3> LitScene::first_flight_at_vertices(const Sky& sky) const 
 }
 
 std::vector<glm::vec3> LitScene::bounced_at_vertices(Side side) const {
-  const std::vector<Float3> difference = part_difference(engine_);
   const PictureLight light{.indirect_irradiance = indirect(side),
                            .emitted_irradiance = emitted_,
-                           .reflected_exitance = reflected_[index(side)],
-                           .part_difference = difference};
+                           .reflected_exitance = reflected_[index(side)]};
   return light_at_vertices(*data_, light).bounced;
 }
 
@@ -116,14 +114,12 @@ std::vector<float> LitScene::patch_errors(Side side) {
 
 float LitScene::find_exposure(std::span<const Light> lights, const Sky& sky, const Camera& camera,
                               Show show) const {
-  const std::vector<Float3> difference = part_difference(engine_);
   return exposure_for(pictures_,
                       {.lights = lights,
                        .sky = sky,
                        .indirect_irradiance = indirect(Side::kFirst),
                        .emitted_irradiance = emitted_,
-                       .reflected_exitance = reflected_[index(Side::kFirst)],
-                       .part_difference = difference},
+                       .reflected_exitance = reflected_[index(Side::kFirst)]},
                       camera, is_light(show) ? show : Show::kRadiosity);
 }
 
