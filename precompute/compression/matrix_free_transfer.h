@@ -31,8 +31,9 @@ class MatrixFreeTransfer {
   MatrixFreeTransfer(const MatrixFreeTransfer&) = delete;
   MatrixFreeTransfer& operator=(const MatrixFreeTransfer&) = delete;
 
-  /// The operator of a `tolerance` that is that of the settings or, at the least, half of it.
-  /// Throws likewise.
+  /// The operator of a `tolerance` that is that of the settings or, at the least, half of it. Below
+  /// that of the settings the error may be a fifth larger than the tolerance, because the columns
+  /// stay as exact as the settings ask. Throws likewise.
   std::shared_ptr<const HierarchicalOperator> compress(const FittingLights& lights,
                                                        double tolerance,
                                                        const Progress& progress = {}) const;
