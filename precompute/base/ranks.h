@@ -48,9 +48,8 @@ class Ranks {
   std::size_t count() const { return communicator_ == nullptr ? 1 : communicator_->count(); }
   bool alone() const { return count() == 1; }
 
-  /// The rank that makes item k of a loop whose items go to ranks in turns, `run` at a time.
-  std::size_t owner(std::size_t k, std::size_t run = 1) const { return k / run % count(); }
-  bool makes(std::size_t k, std::size_t run = 1) const { return owner(k, run) == rank(); }
+  /// Whether this rank makes item k of a loop whose items go to ranks in turns, `run` at a time.
+  bool makes(std::size_t k, std::size_t run = 1) const { return k / run % count() == rank(); }
 
   /// Gives all ranks the items that each has made, with the same `run` as in makes(). Their number
   /// is the same on all ranks.
@@ -110,10 +109,10 @@ class Ranks {
     }
   }
 
+ private:
   /// Gives all ranks the bytes of rank `root`.
   void broadcast(std::span<std::byte> bytes, std::size_t root) const;
 
- private:
   template <typename Visit>
   void for_each_of(std::size_t root, std::size_t item_count, std::size_t run,
                    const Visit& visit) const {

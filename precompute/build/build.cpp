@@ -93,8 +93,7 @@ class TransferBuild {
     }
     decided_ = decide(settings_, model_);
     const bool links = decided_.exchange_source == ExchangeSource::kLinks;
-    if (links) tracer_.emplace(make_surface_tracer(model_.mesh));
-    const std::size_t link_count = links ? forecast_links(model_, *tracer_, decided_, clock_) : 0;
+    const std::size_t link_count = links ? forecast_links(model_, tracer(), decided_, clock_) : 0;
     report_.estimate = estimate_cost(model_, roles_, decided_, link_count);
     const bool fits = report_.estimate.peak_bytes <= decided_.memory_limit_bytes;
     if (fits && decided_.exchange_source == ExchangeSource::kPairs) forecast_pairs();
@@ -104,13 +103,12 @@ class TransferBuild {
   /// Finds the exchange of the patches, and what brings their light to where it is shown. Patches
   /// and mesh then belong to the data.
   void find_exchange() {
-    if (!tracer_) tracer_.emplace(make_surface_tracer(model_.mesh));
     const bool links = decided_.exchange_source == ExchangeSource::kLinks;
     const bool operator_of_links = links && decided_.operator_kind != OperatorKind::kNoOperator;
     const bool judged = operator_of_links && settings_.form_factors.link_epsilon == 0;
     EscapedLight escaped =
-        links ? find_links(model_, *tracer_, roles_, judged, decided_, data_, report_, clock_)
-              : find_pairs(model_, *tracer_, decided_, data_, report_, clock_);
+        links ? find_links(model_, tracer(), roles_, judged, decided_, data_, report_, clock_)
+              : find_pairs(model_, tracer(), decided_, data_, report_, clock_);
     if (operator_of_links) {
       LinkedBuild build =
           linked_build(built_scene(model_.patches.size(), model_.mesh), report_.link_count,
@@ -151,6 +149,12 @@ class TransferBuild {
   }
 
  private:
+  /// Of the surfaces of the model, made once.
+  const RayTracer& tracer() {
+    if (!tracer_) tracer_.emplace(make_surface_tracer(model_.mesh));
+    return *tracer_;
+  }
+
   /// The data, with those form factors alone that are to be kept.
   TransferData take() {
     if (!settings_.store_form_factors) data_.exchange = {};
@@ -160,9 +164,8 @@ class TransferBuild {
 
   /// Forecasts the time of a build from pairs, from short samples.
   void forecast_pairs() {
-    tracer_.emplace(make_surface_tracer(model_.mesh));
     clock_.run("estimate", [&](const Progress& part) {
-      sample_pairs(model_, *tracer_, decided_, part, report_.estimate);
+      sample_pairs(model_, tracer(), decided_, part, report_.estimate);
       return true;
     });
   }

@@ -349,24 +349,31 @@ def vanish_often(command, program, work, moments, draw):
     return faults
 
 
-def parsed_arguments():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def argument_parser(description, moments):
+    """What all drivers of kills take; `moments` is the default."""
+    parser = argparse.ArgumentParser(description=description)
     parser.add_argument("program", type=pathlib.Path)
     parser.add_argument("work", type=pathlib.Path)
-    parser.add_argument("--moments", type=int, default=100, help="in each stage of each command")
+    parser.add_argument("--moments", type=int, default=moments, help="in each stage of each command")
     parser.add_argument("--seed", type=int, default=None)
-    parser.add_argument("--only", help="this command alone")
-    return parser.parse_args()
+    return parser
 
 
-def main():
-    arguments = parsed_arguments()
+def prepared(arguments):
+    """The program, an empty folder, and random numbers whose seed is printed."""
     program, work = arguments.program.resolve(), arguments.work.resolve()
     seed = arguments.seed if arguments.seed is not None else random.randrange(1 << 32)
-    draw = random.Random(seed)
     print(f"seed {seed}", flush=True)
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir(parents=True)
+    return program, work, random.Random(seed)
+
+
+def main():
+    parser = argument_parser(__doc__.splitlines()[0], moments=100)
+    parser.add_argument("--only", help="this command alone")
+    arguments = parser.parse_args()
+    program, work, draw = prepared(arguments)
     transfer = work / "room.safetensors"
     subprocess.run([program, "precompute", SCENE, "--patches", "40", "--quality", "low", "--quiet",
                     "--operator", "dense", "-o", transfer], check=True, stdin=subprocess.DEVNULL)

@@ -8,10 +8,8 @@ on from the checkpoint, to the same bytes.
 Usage: ranks.py PROGRAM WORK [--moments N] [--most RANKS] [--seed S]
 """
 
-import argparse
 import os
 import pathlib
-import random
 import subprocess
 import sys
 import time
@@ -104,21 +102,16 @@ def kill_and_go_on(program, folder, known, draw, most, moment):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("program", type=pathlib.Path)
-    parser.add_argument("work", type=pathlib.Path)
-    parser.add_argument("--moments", type=int, default=1, help="kills in each stage")
+    parser = kills.argument_parser(__doc__.splitlines()[0], moments=1)
     parser.add_argument("--most", type=int, default=3, help="ranks at most, 2 or more")
-    parser.add_argument("--seed", type=int, default=random.SystemRandom().randrange(2**32))
     options = parser.parse_args()
-    print(f"seed {options.seed}")
-    draw = random.Random(options.seed)
-    folder = options.work / "out"
-    known = kills.reference(COMMAND, options.program, folder)
+    program, work, draw = kills.prepared(options)
+    folder = work / "out"
+    known = kills.reference(COMMAND, program, folder)
     faults = 0
     for count in range(1, options.most + 1):
         kills.fresh(folder, [])
-        run(count, options.program, folder)
+        run(count, program, folder)
         kills.check_whole(COMMAND, folder, known.files)
         print(f"{count} ranks: the bytes of one process", flush=True)
     for name, first, last in known.stages:
@@ -127,7 +120,7 @@ def main():
         killed = 0
         for _ in range(options.moments):
             try:
-                killed += kill_and_go_on(options.program, folder, known, draw, options.most,
+                killed += kill_and_go_on(program, folder, known, draw, options.most,
                                          draw.uniform(first, last))
             except kills.Fault as fault:
                 faults += 1
