@@ -70,17 +70,6 @@ Scene import_document(const gltf::Document& document, double scale, gltf::Warnin
   return scene;
 }
 
-// Messages quote names from the file, and some messages of tinygltf have several lines.
-std::string one_line(const std::string& text) {
-  std::string line;
-  for (const char character : text) {
-    const bool is_control = static_cast<unsigned char>(character) < 0x20 || character == 0x7F;
-    line += is_control ? ' ' : character;
-  }
-  line.erase(line.find_last_not_of(' ') + 1);
-  return line;
-}
-
 }  // namespace
 
 Scene import_gltf(const std::filesystem::path& path, double scale) {
@@ -94,9 +83,9 @@ Scene import_gltf(const std::filesystem::path& path, double scale) {
     for (std::string& warning : scene.warnings) warning = one_line(warning);
     return scene;
   } catch (const std::bad_alloc&) {
-    throw Error(one_line(fmt::format("{}: not enough memory to import it", path.string())));
+    throw Error(fmt::format("{}: not enough memory to import it", path.string()));
   } catch (const std::exception& failure) {
-    throw Error(one_line(fmt::format("{}: {}", path.string(), failure.what())));
+    throw Error(fmt::format("{}: {}", path.string(), failure.what()));
   }
 }
 
