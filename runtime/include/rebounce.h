@@ -50,7 +50,7 @@ typedef enum rebounce_status {
   REBOUNCE_INTERNAL = 5     /* a mistake of ours */
 } rebounce_status;
 
-/* REBOUNCE_ABI_VERSION and the version ("0.1.0") of the library that is linked. */
+/* REBOUNCE_ABI_VERSION and the version ("MAJOR.MINOR.PATCH") of the library that is linked. */
 uint32_t rebounce_abi_version(void);
 const char* rebounce_version(void);
 
