@@ -8,7 +8,7 @@ namespace rebounce::test_error {
 namespace {
 
 TEST(Error, NamesOutOfAFileDoNotBreakTheLine) {
-  const std::string name("lam\n\0p\x1B[2J\x7F", 10);
+  const std::string name("lam\n\0p\x1B[2J\x7F", 11);
   EXPECT_STREQ(Error("cannot open " + name + ".ies").what(), "cannot open lam  p [2J .ies");
 }
 
