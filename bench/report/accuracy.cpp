@@ -112,7 +112,10 @@ class AccuracyBench {
          first += static_cast<std::size_t>(settings_.lamp_count)) {
       std::vector<Cut> cuts(settings_.lamp_count);
       if (!method->iterates()) {
-        rows.push_back(row(contestant, first, 0, *method, cuts));
+        // Wherever iterations start from, a product is the same.
+        if (rows.empty() || rows.back().change != cases_[first].change) {
+          rows.push_back(row(contestant, first, 0, *method, cuts));
+        }
         continue;
       }
       for (const int sweeps : settings_.sweeps) {
@@ -137,7 +140,10 @@ class AccuracyBench {
   /// Over the lamps of the change whose first case is `first`; `cuts` are theirs.
   AccuracyRow row(std::size_t contestant, std::size_t first, int sweeps, Method& method,
                   std::vector<Cut>& cuts) const {
-    AccuracyRow result{.contestant = contestant, .change = cases_[first].change, .sweeps = sweeps};
+    AccuracyRow result{.contestant = contestant,
+                       .change = cases_[first].change,
+                       .sweeps = sweeps,
+                       .cold = method.iterates() && cases_[first].cold()};
     for (std::size_t k = first; k < first + settings_.lamp_count; ++k) {
       run(contestant, k, sweeps, method, cuts[k - first]);
       const auto error = [&](const std::vector<Float3>& truth) {
@@ -155,9 +161,7 @@ class AccuracyBench {
     return result;
   }
 
-  static Start start_of(const AccuracyRow& row) {
-    return {row.contestant, row.sweeps > 0 && row.change == "from zero"};
-  }
+  static Start start_of(const AccuracyRow& row) { return {row.contestant, row.cold}; }
 
   /// Adds the times, each found once for all rows that share it.
   void time(std::vector<AccuracyRow>& rows) const {
@@ -257,7 +261,7 @@ std::vector<RunTime> run_times(const std::vector<AccuracyRow>& rows, std::size_t
   std::vector<std::map<int, double>> by_sweeps(contestant_count);
   for (const AccuracyRow& row : rows) {
     if (row.sweeps == 0) times[row.contestant].start = row.time.median * 1e6;
-    if (row.sweeps > 0 && row.change != "from zero") {
+    if (row.sweeps > 0 && !row.cold) {
       by_sweeps[row.contestant][row.sweeps] = row.time.median * 1e6;
     }
   }

@@ -14,6 +14,7 @@ struct AccuracyRow {
   std::size_t contestant = 0;  ///< in the list of contestants
   std::string change;          ///< as LightCase names it
   int sweeps = 0;              ///< 0: a product
+  bool cold = false;           ///< an iteration that starts in the dark
   double error = 0;            ///< reflected_error against the reference, mean over the lamps
   double error_max = 0;        ///< its largest
   double iteration_error = 0;  ///< the mean against the solution on the method's own form of F

@@ -73,7 +73,8 @@ std::vector<LightCase> make_light_cases(const Contenders& contenders,
     for (const LightChange& change : changes) {
       cases.push_back({change.name, change.before, change.after, data.patches.reflectance, {}});
     }
-    cases.push_back(repaint(cases[cases.size() - changes.size()], painted));
+    cases.push_back({kSwitched, {}, changes.back().after, data.patches.reflectance, {}});
+    cases.push_back(repaint(cases[cases.size() - changes.size() - 1], painted));
   }
   // Stable: changes in the order of the first lamp.
   std::vector<LightCase> ordered;

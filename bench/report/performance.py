@@ -31,7 +31,8 @@ CONDITIONS = """Errors are of the light that patches reflect after it came from 
 area-weighted L2 over three channels, against conjugate gradients in double precision on the exact form factors. Each
 side has its best form. The inverse: hierarchical at several tolerances, dense, or refined. Gauss-Seidel: forward or
 symmetric, on exact form factors or on compressed ones at several tolerances, whichever is fastest to the error. Warm
-starts begin at the solution of the frame before. Times are of the light of the patches alone, but for a whole frame.
+starts begin at the solution of the frame before; after a switch iterations start there or in the dark, whichever is
+faster. Times are of the light of the patches alone, but for a whole frame.
 Relighting runs on one thread."""
 
 

@@ -36,6 +36,7 @@ ordered_json json_of(const AccuracyRow& row, const Contestant& contestant) {
   ordered_json json = names_of(contestant);
   json.update({{"change", row.change},
                {"sweeps", row.sweeps},
+               {"cold", row.cold},
                {"error", row.error},
                {"error_max", row.error_max},
                {"iteration_error", row.iteration_error},

@@ -117,10 +117,12 @@ def with_infinity(row):
 
 
 def describe(row):
-    """How a row did it: "gauss-seidel, compressed 0.1 %, 3 sweeps"."""
+    """How a row did it: "gauss-seidel, compressed 0.1 %, 3 sweeps"; after a switch iterations may
+    start in the dark, "3 sweeps from zero"."""
     parts = [row["method"], row["transfer"], row["form"]]
     if row["sweeps"] > 0 and row["form"]:
-        parts.append(f"{row['sweeps']} sweep{'s' if row['sweeps'] != 1 else ''}")
+        start = " from zero" if row.get("cold") and row["change"] == SWITCHED else ""
+        parts.append(f"{row['sweeps']} sweep{'s' if row['sweeps'] != 1 else ''}{start}")
     return ", ".join(p for p in parts if p)
 
 

@@ -39,12 +39,13 @@ on the exact form factors. The truth of the light paths is the dense inverse, wh
 
 Each side has its best form. The inverse: hierarchical at several tolerances, dense, or refined. Gauss-Seidel: forward or
 symmetric, on exact form factors or on compressed ones at several tolerances, whichever is fastest to the error. Warm
-starts begin at the converged solution of the frame before on the same form. Both sides have the same menu of tolerances;
+starts begin at the converged solution of the frame before on the same form; after a switch iterations start there or
+in the dark, whichever is faster. Both sides have the same menu of tolerances;
 what only gathers (gathering, conjugate gradients, refinement) has form factors with shared cluster bases, as the inverse
 has them. Caches hold what the method's own last run left; cold ones hold what something else has used. Sweeps that fit into a budget are told by the
 measured times, so that a light path has the same errors in every run with the same times; a method that makes no
 sweep within the budget is left out. Lamps are points, spots, spheres, rectangles and discs in free space, alone: the
-scene's own emitters are dark."""
+scene's own emitters are dark. Of the light that patches then give off, a tenth or more arrives at others."""
 
 
 def missing_line(missing):

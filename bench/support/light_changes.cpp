@@ -51,12 +51,52 @@ double lit_part(const TransferData& data, std::span<const Float3> irradiance) {
   return lit / all;
 }
 
-}  // namespace
-
-std::vector<Float3> light_of(const Light& lamp, const TransferData& data, DirectLighting& direct) {
+/// M0 [n] in lx under one lamp.
+std::vector<Float3> exitance_under(const Light& lamp, const TransferData& data,
+                                   DirectLighting& direct) {
   std::vector<Float3> exitance(data.patches.size());
   direct.compute({&lamp, 1}, {}, exitance);
   reflect(data.patches.reflectance, exitance);
+  return exitance;
+}
+
+/// The part of the light that patches give off first which arrives at other patches: 0 if they give
+/// off none.
+double arriving_part(const PatchTable& patches, std::span<const Float3> exitance) {
+  double arriving = 0, all = 0;
+  for (std::size_t i = 0; i < exitance.size(); ++i) {
+    const auto& [red, green, blue] = exitance[i];
+    const double light = static_cast<double>(patches.area[i]) * (red + green + blue);
+    arriving += light * (1 - patches.sky_visibility[i] - patches.absorbed[i]);
+    all += light;
+  }
+  return all > 0 ? arriving / all : 0;
+}
+
+std::vector<LightChange> draw_changes(const TransferData& data, const RayTracer& tracer,
+                                      std::span<const double> motions, std::uint64_t seed,
+                                      LightType type) {
+  DirectLighting direct(data, tracer);
+  const double size = box_around(data.mesh.position).diagonal();
+  const auto [place, other] = find_places(data, tracer, 0.2 * size, seed);
+  const Float3& target = data.patches.centroid[mix_bits(seed) % data.patches.size()];
+  const auto light_at = [&](const Light& there) {
+    return exitance_under(lamp_of_type(type, there, target, size), data, direct);
+  };
+  const std::vector<Float3> before = light_at(place);
+  std::vector<LightChange> changes = {{"from zero", {}, before}};
+  for (const double part : motions) {
+    changes.push_back({fmt::format("moved {:g} %", 100 * part), before,
+                       light_at(moved(place, other, part * size))});
+  }
+  changes.push_back({kSwitched, before, light_at(other)});
+  return changes;
+}
+
+}  // namespace
+
+std::vector<Float3> light_of(const Light& lamp, const TransferData& data, DirectLighting& direct) {
+  std::vector<Float3> exitance = exitance_under(lamp, data, direct);
   if (area_norm(exitance, data.patches.area) == 0) {
     throw Error("the test lamp lights nothing; the scene must have lit patches that reflect");
   }
@@ -107,22 +147,17 @@ Light lamp_of_type(LightType type, const Light& place, const Float3& target, dou
 
 std::vector<LightChange> light_changes(const TransferData& data, std::span<const double> motions,
                                        std::uint64_t seed, LightType type) {
+  constexpr double kLeastArriving = 0.1;
+  constexpr int kTries = 64;
   const RayTracer tracer = make_surface_tracer(data.mesh);
-  DirectLighting direct(data, tracer);
-  const double size = box_around(data.mesh.position).diagonal();
-  const auto [place, other] = find_places(data, tracer, 0.2 * size, seed);
-  const Float3& target = data.patches.centroid[mix_bits(seed) % data.patches.size()];
-  const auto light_at = [&](const Light& there) {
-    return light_of(lamp_of_type(type, there, target, size), data, direct);
-  };
-  const std::vector<Float3> before = light_at(place);
-  std::vector<LightChange> changes = {{"from zero", {}, before}};
-  for (const double part : motions) {
-    changes.push_back({fmt::format("moved {:g} %", 100 * part), before,
-                       light_at(moved(place, other, part * size))});
+  for (int k = 0; k < kTries; ++k, seed = mix_bits(seed)) {
+    std::vector<LightChange> changes = draw_changes(data, tracer, motions, seed, type);
+    const bool arrives = std::ranges::all_of(changes, [&](const LightChange& change) {
+      return arriving_part(data.patches, change.after) >= kLeastArriving;
+    });
+    if (arrives) return changes;
   }
-  changes.push_back({"switched", before, light_at(other)});
-  return changes;
+  throw Error("no lamp lights much that other surfaces see; give another scene");
 }
 
 }  // namespace rebounce::bench

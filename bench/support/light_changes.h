@@ -19,6 +19,9 @@ struct LightChange {
   std::vector<Float3> before, after;
 };
 
+/// The name of the last change.
+inline constexpr const char* kSwitched = "switched";
+
 /// Parts of the scene's diagonal by which a lamp is moved, unless others are wanted.
 inline constexpr std::array kMotions = {0.01, 0.05, 0.2};
 
@@ -35,8 +38,9 @@ Light lamp_of_type(LightType type, const Light& place, const Float3& target, dou
 /// One lamp in the free space of the scene, of those that `seed` draws: switched on in the dark,
 /// moved by these parts of the scene's diagonal ("moved 1 %"; each in (0, 0.2]), and replaced by
 /// another one elsewhere ("switched"), towards which it moved. It is of `type`, and what shines one
-/// way only shines towards a patch that `seed` draws, wherever the lamp is. Throws Error if it
-/// lights nothing.
+/// way only shines towards a patch that `seed` draws, wherever the lamp is. Of the light that
+/// patches give off, a tenth or more arrives at others: errors are relative to what is reflected
+/// then. Throws Error if no lamp does that.
 std::vector<LightChange> light_changes(const TransferData& data,
                                        std::span<const double> motions = kMotions,
                                        std::uint64_t seed = 1, LightType type = LightType::kPoint);

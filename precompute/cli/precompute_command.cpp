@@ -216,7 +216,8 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   const TransferData data =
       ranks ? build_by_ranks(*ranks, chosen, options, report) : build(chosen, options, report);
   if (ranks && ranks->rank() != 0) return;
-  for (const std::string& warning : report.warnings) print_note(options, "warning: " + one_line(warning));
+  for (const std::string& warning : report.warnings)
+    print_note(options, "warning: " + one_line(warning));
   std::uint64_t file_bytes = 0;
   if (chosen.reader == "web") {
     file_bytes = save_web_files(chosen.output, data);

@@ -1,0 +1,124 @@
+// Links are judged by rays, and made finer where they are off by too much.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+
+#include "precompute/build/build_decisions.h"
+#include "precompute/build/exchange_stage.h"
+#include "precompute/lights/random_lights.h"
+#include "precompute/lights/reference_solution.h"
+#include "tests/support/test_scenes.h"
+#include "transfer/base/area_norm.h"
+
+namespace rebounce::test_link_stage {
+namespace {
+
+constexpr std::size_t kPatchCount = 300;
+constexpr std::uint64_t kSeed = 20261125;
+constexpr int kLights = 12;
+
+// Links that are several times coarser than those of builds are off by some percent.
+constexpr double kCoarseLinks = 1e-2;
+
+Scene room_with_block() {
+  Scene scene = test::empty_scene({0.7F, 0.5F, 0.3F});
+  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
+  test::add_box(scene, {1, 0, 1}, {2, 1.2, 2.5}, false);
+  return scene;
+}
+
+BuildSettings from_links(double epsilon) {
+  BuildSettings settings;
+  settings.exchange_source = ExchangeSource::kLinks;
+  settings.form_factors.link_epsilon = epsilon;
+  return settings;
+}
+
+/// The links that the stage finds for a room, and what it says of them.
+struct Found {
+  explicit Found(const BuildSettings& settings, bool judged = true)
+      : model(make_patch_model(room_with_block(), {.patch_count = kPatchCount})),
+        tracer(test::make_tracer(model)),
+        decided(decide(settings, model)),
+        escaped(find_links(model, tracer, {}, judged, decided, data, report, clock)) {}
+
+  std::ptrdiff_t phases(const std::string& name) const {
+    return std::ranges::count(report.seconds, name, [](const auto& phase) { return phase.first; });
+  }
+
+  BuildReport report;
+  BuildProgress progress;
+  PhaseClock clock{report, progress};
+  TransferData data;
+  PatchModel model;
+  RayTracer tracer;
+  BuildSettings decided;
+  EscapedLight escaped;
+};
+
+/// What the light of links is off by, against very fine ones.
+double error(const Found& found) {
+  static const Found truth(from_links(1e-6), false);
+  TransferData data;
+  data.patches = truth.model.patches;
+  data.patches.sky_visibility = truth.escaped.sky_visibility;
+  data.patches.absorbed = truth.escaped.absorbed;
+  data.mesh = truth.model.mesh;
+  data.materials = room_with_block().materials;
+  const auto lights =
+      random_initial_exitances(data, truth.tracer, LightKind::kPoint, kLights, kSeed);
+  const auto exact = ReferenceSolver(truth.data.links, data.patches).indirect_irradiances(lights);
+  const auto light = ReferenceSolver(found.data.links, data.patches).indirect_irradiances(lights);
+  double sum = 0;
+  for (std::size_t k = 0; k < lights.size(); ++k) {
+    sum += relative_difference(light[k], exact[k], data.patches.area);
+  }
+  return sum / kLights;
+}
+
+TEST(LinkStage, MakesLinksFinerWhileTheyAreOffByTooMuch) {
+  const Found once(from_links(kCoarseLinks), false), found(from_links(kCoarseLinks));
+  EXPECT_EQ(once.phases("check of links"), 0);
+  EXPECT_GE(found.phases("finer links"), 1);
+  EXPECT_LE(found.phases("finer links"), 2);
+  EXPECT_LT(found.decided.form_factors.link_epsilon, 0.7 * kCoarseLinks + 1e-12);
+  EXPECT_GT(found.report.link_count, once.report.link_count);
+  EXPECT_EQ(found.report.link_count, found.data.links.pair.size());
+  EXPECT_GT(found.report.ray_count, once.report.ray_count) << "the rays of all rounds count";
+  RecordProperty("error_once", std::to_string(error(once)));
+  RecordProperty("error", std::to_string(error(found)));
+  EXPECT_LT(error(found), 0.8 * error(once));
+}
+
+TEST(LinkStage, LeavesLinksThatAreFineEnough) {
+  BuildSettings settings = from_links(0);
+  settings.tolerance = 0.05;
+  settings.form_factors.link_epsilon = 1e-4;
+  const Found found(settings);
+  EXPECT_EQ(found.phases("check of links"), 1);
+  EXPECT_EQ(found.phases("finer links"), 0);
+  EXPECT_EQ(found.decided.form_factors.link_epsilon, 1e-4);
+}
+
+TEST(LinkStage, LeavesLinksOfWhichFinerOnesDoNotFit) {
+  BuildSettings settings = from_links(kCoarseLinks);
+  settings.memory_limit_bytes = 1;
+  const Found found(settings);
+  EXPECT_EQ(found.phases("check of links"), 1);
+  EXPECT_EQ(found.phases("finer links"), 0);
+  EXPECT_FALSE(found.data.links.empty());
+}
+
+TEST(LinkStage, GivesPatchesAndMeshBack) {
+  const Found found(from_links(kCoarseLinks));
+  EXPECT_NEAR(static_cast<double>(found.model.patches.size()), kPatchCount, kPatchCount / 4.0);
+  EXPECT_EQ(found.escaped.sky_visibility.size(), found.model.patches.size());
+  EXPECT_FALSE(found.model.mesh.position.empty());
+  EXPECT_EQ(found.data.patches.size(), 0U);
+  EXPECT_TRUE(found.data.mesh.position.empty());
+}
+
+}  // namespace
+}  // namespace rebounce::test_link_stage
