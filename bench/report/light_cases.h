@@ -25,8 +25,7 @@ inline constexpr const char* kRepainted = "repainted";
 /// The changes of light_changes.h for each of settings.lamp_count lamps, the switched one a second
 /// time from a cold start, which is often the better one then, and a repainted scene under each.
 /// All lamps of a change follow each other, and what a change begins with is what the first one,
-/// "from zero", ends with. Throws Error if the scene cannot be lit so, Cancelled if
-/// asked to stop.
+/// "from zero", ends with. Throws Error if the scene cannot be lit so, Cancelled if asked to stop.
 std::vector<LightCase> make_light_cases(const Contenders& contenders,
                                         const ReportSettings& settings,
                                         const ReportProgress& progress);

@@ -22,11 +22,8 @@ constexpr int kLights = 12;
 // Links that are several times coarser than those of builds are off by some percent.
 constexpr double kCoarseLinks = 1e-2;
 
-Scene room_with_block() {
-  Scene scene = test::empty_scene({0.7F, 0.5F, 0.3F});
-  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
-  test::add_box(scene, {1, 0, 1}, {2, 1.2, 2.5}, false);
-  return scene;
+Scene room() {
+  return test::room_with_block({0.7F, 0.5F, 0.3F});
 }
 
 BuildSettings from_links(double epsilon) {
@@ -39,7 +36,7 @@ BuildSettings from_links(double epsilon) {
 /// The links that the stage finds for a room, and what it says of them.
 struct Found {
   explicit Found(const BuildSettings& settings, bool judged = true)
-      : model(make_patch_model(room_with_block(), {.patch_count = kPatchCount})),
+      : model(make_patch_model(room(), {.patch_count = kPatchCount})),
         tracer(test::make_tracer(model)),
         decided(decide(settings, model)),
         escaped(find_links(model, tracer, {}, judged, decided, data, report, clock)) {}
@@ -66,7 +63,7 @@ double error(const Found& found) {
   data.patches.sky_visibility = truth.escaped.sky_visibility;
   data.patches.absorbed = truth.escaped.absorbed;
   data.mesh = truth.model.mesh;
-  data.materials = room_with_block().materials;
+  data.materials = room().materials;
   const auto lights =
       random_initial_exitances(data, truth.tracer, LightKind::kPoint, kLights, kSeed);
   const auto exact = ReferenceSolver(truth.data.links, data.patches).indirect_irradiances(lights);
@@ -93,9 +90,8 @@ TEST(LinkStage, MakesLinksFinerWhileTheyAreOffByTooMuch) {
 }
 
 TEST(LinkStage, LeavesLinksThatAreFineEnough) {
-  BuildSettings settings = from_links(0);
+  BuildSettings settings = from_links(1e-4);
   settings.tolerance = 0.05;
-  settings.form_factors.link_epsilon = 1e-4;
   const Found found(settings);
   EXPECT_EQ(found.phases("check of links"), 1);
   EXPECT_EQ(found.phases("finer links"), 0);
