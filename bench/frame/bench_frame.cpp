@@ -25,6 +25,7 @@ namespace {
 
 constexpr std::array<std::size_t, 3> kLightCounts = {1, 4, 16};
 constexpr std::size_t kMovingCount = 2;  // of the lights of a whole frame
+constexpr std::size_t kLitCount = 4;     // lights under which the stages after direct light run
 constexpr std::size_t kMapSize = 8;      // of an irradiance map
 
 constexpr const char* kBareRays = "16,384 shadow rays alone";
@@ -80,6 +81,7 @@ class FrameBenchmark {
     names_.clear();
     cases_.clear();
     for (const std::size_t count : kLightCounts) add_lights(count);
+    engine_.relight(MovingLights(engine_, kLitCount, 0).next(), {});  // light for what follows
     add("initial exitance", {}, [this] { engine_.parts().compute_initial_exitance(); });
     add("product", {}, [this] { engine_.parts().apply_transfer(); });
     add("radiosity", {}, [this] { engine_.parts().compute_radiosity(); });

@@ -34,14 +34,18 @@ enum class Stage : std::uint8_t {
   kExpandClusters,
   kExpandPositions,
   kRadiosity,
+  kSetLight,
+  kReceiverRows,
   kVertices,
   kVertexValues,  // as kVertices, with negative sums
   kTexels,
   kProbes,
 };
-constexpr std::array<const char*, 11> kStageNames = {
-    "initial exitance", "project positions", "project clusters", "couplings",     "expand clusters",
-    "expand positions", "radiosity",         "vertices",         "texel corners", "texels",
+constexpr std::array<const char*, 13> kStageNames = {
+    "initial exitance", "project positions", "project clusters",
+    "couplings",        "expand clusters",   "expand positions",
+    "radiosity",        "light of sets",     "rows",
+    "vertices",         "texel corners",     "texels",
     "probes",
 };
 constexpr std::size_t kStageCount = kStageNames.size();
@@ -82,6 +86,8 @@ struct GpuEngine::Parts {
         couple(gl, "couple.glsl", ShaderSources::kCouple),
         expand(gl, "expand.glsl", ShaderSources::kExpand),
         radiosity_shader(gl, "radiosity.glsl", ShaderSources::kRadiosity),
+        average_sets(gl, "set_light.glsl", ShaderSources::kSetLight),
+        add_rows(gl, "receiver_rows.glsl", ShaderSources::kReceiverRows),
         vertices(gl, "vertex_irradiance.glsl", ShaderSources::kVertexIrradiance),
         texels(gl, "lightmap_irradiance.glsl", ShaderSources::kLightmapIrradiance),
         probes(gl, "probe_light.glsl", ShaderSources::kProbeLight),
@@ -98,7 +104,15 @@ struct GpuEngine::Parts {
         strips(table(tables.strips)),
         strip_entries(table(tables.strip_entries)),
         vertex_begin(table(vertex_begins(scene.mesh))),
-        vertex_weights(table(weights_of(scene.mesh))),
+        vertex_weights(table(pairs(scene.mesh.weight_patch, scene.mesh.weight))),
+        set_patches(table(pairs(scene.receiver_rows.patch, areas_in_order()))),
+        sets(table(scene.receiver_rows.set)),
+        row_begin(table(scene.receiver_rows.group_begin)),
+        row_entries(table(pairs(scene.receiver_rows.entry_set, scene.receiver_rows.scale))),
+        row_vertices(table(scene.receiver_rows.vertex)),
+        row_values(table(scene.receiver_rows.value)),
+        set_light(zeros(scene.receiver_rows.set.size() * 4 * sizeof(float))),
+        added(zeros(scene.receiver_rows.empty() ? 0 : triple_bytes(vertex_count))),
         texel_triangles(table(scene.lightmap.triangle)),
         texel_weights(table(scene.lightmap.weight)),
         triangles(scene.lightmap.empty() ? zeros(0) : table(scene.mesh.triangle)),
@@ -132,12 +146,21 @@ struct GpuEngine::Parts {
     return std::vector<std::uint32_t>(mesh.position.size() + 1);
   }
 
-  static std::vector<GpuOperator::Words2> weights_of(const DisplayMesh& mesh) {
-    std::vector<GpuOperator::Words2> weights;
-    weights.reserve(mesh.weight.size());
-    for (std::size_t k = 0; k < mesh.weight.size(); ++k)
-      weights.push_back({mesh.weight_patch[k], std::bit_cast<std::uint32_t>(mesh.weight[k])});
-    return weights;
+  /// An index and the bits of a number, in turns.
+  static std::vector<GpuOperator::Words2> pairs(std::span<const std::uint32_t> index,
+                                                std::span<const float> number) {
+    std::vector<GpuOperator::Words2> words(index.size());
+    for (std::size_t k = 0; k < words.size(); ++k)
+      words[k] = {index[k], std::bit_cast<std::uint32_t>(number[k])};
+    return words;
+  }
+
+  /// Of patches, in the order in which sets of rows have them.
+  std::vector<float> areas_in_order() const {
+    std::vector<float> areas;
+    areas.reserve(scene.receiver_rows.patch.size());
+    for (const std::uint32_t i : scene.receiver_rows.patch) areas.push_back(scene.patches.area[i]);
+    return areas;
   }
 
   /// Fills in what the stages are to do, and returns it for the uniform buffer.
@@ -163,6 +186,8 @@ struct GpuEngine::Parts {
         tables.position_count);
     set(Stage::kExpandPositions, strip_count);
     set(Stage::kRadiosity, tables.position_count);
+    set(Stage::kSetLight, static_cast<std::uint32_t>(scene.receiver_rows.set.size()));
+    set(Stage::kReceiverRows, static_cast<std::uint32_t>(scene.receiver_rows.group_count()));
     set(Stage::kVertices, static_cast<std::uint32_t>(vertex_count));
     set(Stage::kVertexValues, static_cast<std::uint32_t>(vertex_count));
     blocks[static_cast<std::size_t>(Stage::kVertexValues)].keeps_negative = 1;
@@ -194,7 +219,6 @@ struct GpuEngine::Parts {
     if (buffers.indirect_irradiance != 0)
       check_buffer("indirect irradiance", buffers.indirect_irradiance, patch_count);
     if (buffers.radiosity != 0) check_buffer("radiosity", buffers.radiosity, patch_count);
-    if (buffers.vertex_irradiance != 0 || buffers.lightmap_irradiance != 0) check_rows();
     if (buffers.vertex_irradiance != 0)
       check_buffer("light at vertices", buffers.vertex_irradiance, vertex_count);
     if (buffers.lightmap_irradiance != 0) {
@@ -211,14 +235,6 @@ struct GpuEngine::Parts {
     }
     check_all_differ({buffers.direct_irradiance, buffers.indirect_irradiance, buffers.radiosity,
                       buffers.vertex_irradiance, buffers.lightmap_irradiance, buffers.probe_light});
-  }
-
-  /// Rows of vertices are not on the card.
-  void check_rows() const {
-    if (scene.receiver_rows.empty()) return;
-    throw Error(
-        "the card does not add the rows of vertices that the transfer file has; take the light of "
-        "patches from the card, or make the file with --receivers-at patches");
   }
 
   static void check_all_differ(std::vector<unsigned> names) {
@@ -277,13 +293,22 @@ struct GpuEngine::Parts {
     run(Stage::kRadiosity, radiosity_shader, kThreads,
         {indirect, reflectance.name(), all, positions.name(), initial_exitance.name(), 0,
          arriving.name()});
+    if (buffers.vertex_irradiance != 0 || buffers.lightmap_irradiance != 0) {
+      run(Stage::kSetLight, average_sets, 1,
+          {all, set_patches.name(), sets.name(), set_light.name()});
+      run(Stage::kReceiverRows, add_rows, 1,
+          {set_light.name(), row_begin.name(), row_entries.name(), row_vertices.name(),
+           row_values.name(), added.name()});
+    }
     if (buffers.vertex_irradiance != 0) {
       run(Stage::kVertices, vertices, kThreads,
-          {indirect, vertex_begin.name(), vertex_weights.name(), buffers.vertex_irradiance});
+          {indirect, vertex_begin.name(), vertex_weights.name(), added.name(),
+           buffers.vertex_irradiance});
     }
     if (buffers.lightmap_irradiance != 0) {
       run(Stage::kVertexValues, vertices, kThreads,
-          {indirect, vertex_begin.name(), vertex_weights.name(), vertex_values.name()});
+          {indirect, vertex_begin.name(), vertex_weights.name(), added.name(),
+           vertex_values.name()});
       run(Stage::kTexels, texels, kThreads,
           {vertex_values.name(), texel_triangles.name(), texel_weights.name(), triangles.name(),
            buffers.lightmap_irradiance});
@@ -302,10 +327,11 @@ struct GpuEngine::Parts {
   std::shared_ptr<const GlFunctions> gl;
   std::size_t patch_count, vertex_count;
   std::array<StageBlock, kStageCount> blocks{};
-  ComputeProgram initial_exitance_shader, project, couple, expand, radiosity_shader, vertices,
-      texels, probes;
+  ComputeProgram initial_exitance_shader, project, couple, expand, radiosity_shader, average_sets,
+      add_rows, vertices, texels, probes;
   StorageBuffer reflectance, emitted_exitance, positions, scales, bases, couplings, projections,
-      sides, outputs, inputs, strips, strip_entries, vertex_begin, vertex_weights, texel_triangles,
+      sides, outputs, inputs, strips, strip_entries, vertex_begin, vertex_weights, set_patches,
+      sets, row_begin, row_entries, row_vertices, row_values, set_light, added, texel_triangles,
       texel_weights, triangles, probe_begin, probe_patches, probe_weights, probe_sky, vertex_values;
   StorageBuffer initial_exitance, indirect_irradiance, radiosity, light, arriving;
   StorageBuffer stages;

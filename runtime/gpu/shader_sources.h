@@ -10,6 +10,8 @@ struct ShaderSources {
   static const char* const kCouple;
   static const char* const kExpand;
   static const char* const kRadiosity;
+  static const char* const kSetLight;
+  static const char* const kReceiverRows;
   static const char* const kVertexIrradiance;
   static const char* const kLightmapIrradiance;
   static const char* const kProbeLight;

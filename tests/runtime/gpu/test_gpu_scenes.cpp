@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "rebounce/build_settings.h"
+#include "runtime/outputs/texel_light.h"
+#include "runtime/outputs/vertex_light.h"
 #include "tests/runtime/gpu/gpu_frame.h"
 #include "tests/runtime/gpu/shadow_maps.h"
 #include "tests/support/built_scene.h"
@@ -79,9 +81,10 @@ std::vector<Float3> texture_from(const test::LightBuffer& light, const Lightmap&
 }
 
 /// A scene of few patches with a lightmap and probes.
-std::shared_ptr<const TransferData> scene(const std::string& name) {
+std::shared_ptr<const TransferData> scene(const std::string& name, bool rows_at_vertices = false) {
   BuildSettings settings;
   settings.subdivision.patch_count = 600;
+  settings.receiver_rows.at_vertices = rows_at_vertices;
   settings.probes.grid = {3, 2, 3};
   settings.probes.ray_count = 512;
   TransferData built = test::built_scene(name + ".gltf", settings);
@@ -135,11 +138,9 @@ struct FrameLight {
   }
 };
 
-// A lamp in the middle of the scene, and a dim sky: patches of full light beside dark ones.
-void expect_light_of_the_processor(const std::shared_ptr<const TransferData>& data) {
-  const Light lamp = lamp_in_the_middle(*data);
-  Engine engine(data);
-  engine.relight({&lamp, 1}, {.luminance = 1});
+/// What the card writes of the direct light of a frame.
+FrameLight light_of_the_card(const Engine& engine) {
+  const std::shared_ptr<const TransferData> data = engine.shared_data();
   GpuEngine gpu(data, eglGetProcAddress);
   gpu.set_sky(engine.sky());
   const test::FrameBuffers buffers(*data, engine.direct_irradiance());
@@ -149,7 +150,6 @@ void expect_light_of_the_processor(const std::shared_ptr<const TransferData>& da
   names.lightmap_irradiance = lightmap.name();
   names.probe_light = probes.name();
   gpu.relight(names);
-
   FrameLight found;
   found.indirect = buffers.indirect.read();
   found.radiosity = buffers.radiosity.read();
@@ -157,6 +157,15 @@ void expect_light_of_the_processor(const std::shared_ptr<const TransferData>& da
   found.texels = lightmap.read();
   found.probes = probes.read();
   EXPECT_EQ(found.texels, texture_from(lightmap, data->lightmap));
+  return found;
+}
+
+// A lamp in the middle of the scene, and a dim sky: patches of full light beside dark ones.
+void expect_light_of_the_processor(const std::shared_ptr<const TransferData>& data) {
+  const Light lamp = lamp_in_the_middle(*data);
+  Engine engine(data);
+  engine.relight({&lamp, 1}, {.luminance = 1});
+  const FrameLight found = light_of_the_card(engine);
 
   // The card has the stored values, and rounds sums of floats alone.
   EXPECT_LE(test::largest_difference(exact_irradiance(engine), found.indirect), 1e-4);
@@ -213,6 +222,63 @@ void expect_light_of_shadow_rays(const std::shared_ptr<const TransferData>& data
   if (comes_in) {
     expect_direct_light(*data, engine, gpu, maps.plane(sun, 2 * kSide, true), kTolerance, "sun");
   }
+}
+
+/// What rows add at the vertices, by plain sums over what is stored.
+std::vector<Float3> exact_rows(const TransferData& data, std::span<const Float3> radiosity) {
+  const ReceiverRows& rows = data.receiver_rows;
+  std::vector<Float3> added(data.mesh.position.size());
+  std::array<double, ReceiverRows::kGroup> sum;
+  for (std::size_t g = 0; g < rows.group_count(); ++g) {
+    for (int c = 0; c < kChannelCount; ++c) {
+      sum = {};
+      for (std::size_t e = rows.group_begin[g]; e < rows.group_begin[g + 1]; ++e) {
+        double flux = 0, area = 0;
+        const auto [begin, end] = rows.set[rows.entry_set[e]];
+        for (std::size_t k = begin; k < end; ++k) {
+          const std::uint32_t patch = rows.patch[k];
+          flux += double{data.patches.area[patch]} * radiosity[patch][c];
+          area += data.patches.area[patch];
+        }
+        for (std::size_t i = 0; i < sum.size(); ++i) {
+          sum[i] += rows.value[ReceiverRows::value_index(e, i)] * rows.scale[e] * flux / area;
+        }
+      }
+      for (std::size_t i = 0; i < sum.size(); ++i) {
+        const std::uint32_t vertex = rows.vertex[g * sum.size() + i];
+        if (vertex != kNone) added[vertex][c] = static_cast<float>(sum[i]);
+      }
+    }
+  }
+  return added;
+}
+
+// The processor rounds what the rows are multiplied with, the card does not.
+TEST(GpuReceiverRows, AreAddedAtVerticesAndTexels) {
+  const test::GlContext context;
+  if (!context.is_current()) GTEST_SKIP() << "there is no OpenGL 4.3 on this machine";
+  const auto data = scene("furnished_room", true);
+  ASSERT_GT(data->receiver_rows.group_count(), 1U);
+  const Light lamp = lamp_in_the_middle(*data);
+  Engine engine(data);
+  engine.relight({&lamp, 1}, {});
+  const FrameLight found = light_of_the_card(engine);
+
+  std::vector<Float3> vertices(data->mesh.position.size()), texels(data->lightmap.triangle.size());
+  reconstruct_at_vertices(data->mesh, found.indirect, vertices);
+  const std::vector<Float3> added = exact_rows(*data, found.radiosity), without = vertices;
+  for (std::size_t v = 0; v < vertices.size(); ++v) {
+    for (int c = 0; c < kChannelCount; ++c) vertices[v][c] += added[v][c];
+  }
+  EXPECT_GT(test::largest_difference(without, vertices), 0.05);
+  interpolate_at_texels(data->lightmap, data->mesh, vertices, texels);
+  clamp_light(vertices);
+  EXPECT_LE(test::largest_difference(vertices, found.vertices), 1e-5);
+  EXPECT_LE(test::largest_difference(texels, found.texels), 1e-5);
+
+  const FrameLight of_processor(engine);
+  EXPECT_LE(test::largest_difference(of_processor.vertices, found.vertices), 6e-3);
+  EXPECT_LE(test::largest_difference(of_processor.texels, found.texels), 6e-3);
 }
 
 TEST_P(GpuScenes, AreLitAsByTheProcessor) {

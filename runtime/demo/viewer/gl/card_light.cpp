@@ -28,8 +28,7 @@ bool CardLight::is_possible(const TransferData& data) {
   GLint major = 0, minor = 0;
   glGetIntegerv(GL_MAJOR_VERSION, &major);
   glGetIntegerv(GL_MINOR_VERSION, &minor);
-  return 10 * major + minor >= 43 && data.receiver_rows.empty() &&
-         data.transfer->kind() == OperatorKind::kHierarchical;
+  return 10 * major + minor >= 43 && data.transfer->kind() == OperatorKind::kHierarchical;
 }
 
 bool CardLight::can_light(const Light& light) {
