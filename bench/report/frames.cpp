@@ -62,14 +62,26 @@ std::vector<Run> list_runs(const std::vector<RunTime>& times, const std::vector<
   return runs;
 }
 
-std::vector<float> follow(const LitFrames& lit, int sweeps, std::span<const float> area,
-                          Method& method) {
+/// Follows a path. In the frame of a switch what iterates goes on from the frame before or starts
+/// in the dark, whichever is nearer to the truth after its sweeps.
+std::vector<float> follow(const LitFrames& lit, const std::vector<int>& switches, int sweeps,
+                          std::span<const float> area, Method& method) {
   method.start_from(lit.truth.front());
   std::vector<float> errors;
   for (std::size_t frame = 0; frame < lit.truth.size(); ++frame) {
-    method.run(lit.initial_exitance[frame], sweeps, kConvergedResidual);
-    errors.push_back(static_cast<float>(
-        reflected_error(method.radiosity(), lit.truth[frame], lit.initial_exitance[frame], area)));
+    const auto run = [&] {
+      method.run(lit.initial_exitance[frame], sweeps, kConvergedResidual);
+      return static_cast<float>(
+          reflected_error(method.radiosity(), lit.truth[frame], lit.initial_exitance[frame], area));
+    };
+    errors.push_back(run());
+    if (!method.iterates() || !std::ranges::binary_search(switches, static_cast<int>(frame)))
+      continue;
+    const std::vector<Float3> from_before(method.radiosity().begin(), method.radiosity().end());
+    method.reset();
+    const float from_dark = run();
+    if (from_dark >= errors.back()) method.start_from(from_before);
+    errors.back() = std::min(errors.back(), from_dark);
   }
   return errors;
 }
@@ -122,7 +134,8 @@ std::vector<FrameRow> measure_frames(const Contenders& contenders,
       if (contestant.name == kDenseInverse) {
         return std::vector<float>(lit.truth.size(), static_cast<float>(truth_error));
       }
-      return follow(lit, sweeps, data.patches.area, *contestant.make(contenders));
+      return follow(lit, paths[p].switches, sweeps, data.patches.area,
+                    *contestant.make(contenders));
     };
     in_parallel(runs.size(), part, [&](std::size_t k) {
       FrameRow row{
