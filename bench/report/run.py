@@ -30,9 +30,10 @@ SCENES = ("cornell_box", "two_rooms", "furnished_room", "pavilion", "white_room"
 SIZES, QUICK_SIZES = (1000, 4000, 16000), (1000,)
 TINY = (("cornell_box", 100), ("cornell_box", 300))
 
-# Seconds that a measurement takes on two cores that do nothing else, at 1,000 patches and with what
-# exponent of their number; replaced by what finished ones took.
-USUAL_SECONDS, QUICK_SECONDS, EXPONENT = 90, 20, 1.3
+# Seconds that a measurement takes on two cores that do nothing else: those of any size, and those
+# of 1,000 patches, which grow with this exponent of their number (lab/125). What finished ones took
+# scales them.
+ANY_SECONDS, SECONDS, QUICK_SECONDS, EXPONENT = 135, 22, 20, 1.3
 
 
 def parse_arguments():
@@ -92,12 +93,19 @@ def finished(job, commit):
         return None
 
 
+def usual_seconds(patches, quick):
+    if quick:
+        return QUICK_SECONDS * (patches / 1000) ** EXPONENT
+    return ANY_SECONDS + SECONDS * (patches / 1000) ** EXPONENT
+
+
 def estimate(job, done, quick):
-    """Seconds, from the finished measurement of the nearest size."""
-    seconds, patches = (QUICK_SECONDS if quick else USUAL_SECONDS), 1000
-    if done:
-        patches, seconds = min(done, key=lambda known: abs(known[0] - job.patches))
-    return seconds * (job.patches / patches) ** EXPONENT
+    """Seconds; from the finished measurement of the nearest size, if there is one."""
+    seconds = usual_seconds(job.patches, quick)
+    if not done:
+        return seconds
+    patches, took = min(done, key=lambda known: abs(known[0] - job.patches))
+    return took * seconds / usual_seconds(patches, quick)
 
 
 def readable(seconds):
