@@ -17,7 +17,6 @@
 #include "runtime/outputs/probe_irradiance.h"
 #include "runtime/outputs/probe_light.h"
 #include "runtime/outputs/surface_light.h"
-#include "runtime/outputs/texel_light.h"
 #include "runtime/outputs/vertex_light.h"
 
 namespace rebounce::bench {
@@ -117,7 +116,7 @@ class FrameBenchmark {
     const auto own = std::make_shared<Engine>(engine_);
     add("frame, two moved", count, [this, own, some] {
       own->relight(some->next(), {});
-      reconstruct_at_vertices(own->data().mesh, own->indirect_irradiance(), vertices_);
+      vertex_irradiance(*own, vertices_);
     });
   }
 
@@ -134,12 +133,8 @@ class FrameBenchmark {
     }
   }
 
-  void to_vertices() {
-    reconstruct_at_vertices(engine_.data().mesh, engine_.indirect_irradiance(), vertices_);
-  }
-  void to_texels() {
-    interpolate_at_texels(engine_.data().lightmap, engine_.data().mesh, vertices_, texels_);
-  }
+  void to_vertices() { vertex_irradiance(engine_, vertices_); }
+  void to_texels() { lightmap_irradiance(engine_, texels_); }
   void to_surface() {
     apply_surface_harmonics(engine_.data().surface_harmonics, engine_.radiosity(), {}, surface_);
     reconstruct_at_vertices(engine_.data().mesh, surface_, surface_at_vertices_);

@@ -51,7 +51,7 @@ class ReceiverBenchmark {
         tracer_(make_surface_tracer(data.mesh)),
         area_(vertex_areas(data.mesh)),
         exact_(make({0.0, ReceiverRows::kMostSets}).rows) {
-    for (const std::uint32_t v : exact_.vertex) {
+    for (const std::uint32_t v : exact_.receiver) {
       if (v != kNone) compared_.push_back(v);
     }
   }
@@ -76,7 +76,9 @@ class ReceiverBenchmark {
     std::tie(settings.tolerance, settings.most_sets) = limits;
     Made made;
     made.seconds = seconds_of([&] {
-      made.rows = make_receiver_rows(data_, data_.mesh.triangle_patch, tracer_, settings, 1);
+      made.rows = make_receiver_rows(data_, data_.mesh.triangle_patch,
+                                     VertexReceivers(data_, data_.mesh.triangle_patch), tracer_,
+                                     settings, 1);
     });
     return made;
   }
@@ -138,11 +140,11 @@ class ReceiverBenchmark {
     };
     const auto receivers = static_cast<double>(compared_.size());
     const double bytes = static_cast<double>(made.rows.value.size() + 8 * made.rows.scale.size() +
-                                             4 * made.rows.vertex.size()) /
+                                             4 * made.rows.receiver.size()) /
                          receivers;
     const std::size_t with_rows =
-        made.rows.vertex.size() -
-        static_cast<std::size_t>(std::ranges::count(made.rows.vertex, kNone));
+        made.rows.receiver.size() -
+        static_cast<std::size_t>(std::ranges::count(made.rows.receiver, kNone));
     if (error.empty()) return;
     table.add({scene_name(data_), data_.patches.size(), tolerance, sets, std::string(name(kind)),
                mean(of_weights), std::ranges::max(of_weights), mean(error), std::ranges::max(error),

@@ -113,7 +113,7 @@ class TransferBuild {
       LinkedBuild build =
           linked_build(built_scene(model_.patches.size(), model_.mesh), report_.link_count,
                        model_.patches.reflectance, roles_, kCompressionPart * decided_.tolerance);
-      build.row_bytes = bytes_of_receiver_rows(model_, decided_.receiver_rows);
+      build.row_bytes = bytes_of_receiver_rows(model_, decided_);
       std::uint64_t& limit = decided_.memory_limit_bytes;
       announce(report_.estimate_after_links.emplace(estimate_after_links(build, limit)));
       limit -= std::min(limit - 1, build.held_bytes);  // what is left for the other stages

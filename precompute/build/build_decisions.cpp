@@ -38,8 +38,11 @@ BuildSettings decide(BuildSettings settings, const PatchModel& model) {
   if (restricted_roles && !hierarchical) {
     throw Error("receivers and sources are for hierarchical operators alone; ask for one");
   }
-  if (settings.receiver_rows.at_vertices && settings.operator_kind == OperatorKind::kNoOperator) {
-    throw Error("rows of vertices need an operator; ask for one, or for receivers at patches");
+  if (settings.receiver_rows.any() && settings.operator_kind == OperatorKind::kNoOperator) {
+    throw Error("rows of receivers need an operator; ask for one, or for receivers at patches");
+  }
+  if (settings.receiver_rows.at_texels && settings.lightmap.size == 0) {
+    throw Error("rows of texels need a lightmap; ask for one (--lightmap 512, for instance)");
   }
   if (!links && !Ranks().alone()) {
     throw Error("the ranks of mpirun share builds from links alone; add --form-factors links");

@@ -96,11 +96,15 @@ std::uint64_t bytes_of_weights(const BuiltScene& scene) {
 
 }  // namespace
 
-std::uint64_t bytes_of_receiver_rows(const PatchModel& model, const ReceiverRowSettings& rows) {
-  if (!rows.at_vertices) return 0;
+std::uint64_t bytes_of_receiver_rows(const PatchModel& model, const BuildSettings& decided) {
+  const ReceiverRowSettings& rows = decided.receiver_rows;
+  if (!rows.any()) return 0;
   const std::uint64_t n = model.patches.size(), rays = static_cast<std::uint64_t>(rows.ray_count);
+  const std::uint64_t texels = std::uint64_t{decided.lightmap.size} * decided.lightmap.size;
+  const std::uint64_t receivers =
+      (rows.at_vertices ? model.mesh.position.size() : 0) + (rows.at_texels ? texels : 0);
   return sizeof(std::uint64_t) * n * std::min(n, rays) +
-         4 * std::uint64_t{rows.most_sets} * model.mesh.position.size();
+         4 * std::uint64_t{rows.most_sets} * receivers;
 }
 
 std::uint64_t memory_limit_bytes(const BuildSettings& settings) {
@@ -174,7 +178,7 @@ CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
   if (decided.exchange_source == ExchangeSource::kPairs) {
     estimate.peak_bytes =
         peak_bytes_of_pairs(scene, matrices, decided.operator_kind, decided.rank) +
-        bytes_of_receiver_rows(model, decided.receiver_rows);
+        bytes_of_receiver_rows(model, decided);
     return estimate;
   }
   const LinkedBuild build{scene,      resident_memory_bytes(),
@@ -184,7 +188,7 @@ CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
   if (decided.operator_kind != OperatorKind::kNoOperator) {
     estimate.peak_bytes =
         std::max(estimate.peak_bytes, peak_bytes_after_links(build, decided.memory_limit_bytes) +
-                                          bytes_of_receiver_rows(model, decided.receiver_rows));
+                                          bytes_of_receiver_rows(model, decided));
   }
   return estimate;
 }

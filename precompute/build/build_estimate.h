@@ -25,9 +25,9 @@ struct BuiltScene {
   std::size_t micro_triangle_count = 0;  ///< of triangles with opacity maps
 };
 
-/// Of rows of vertices while they are found: those of the patches, as sparse as rays leave them,
+/// Of rows of receivers while they are found: those of the patches, as sparse as rays leave them,
 /// and twice what is stored.
-std::uint64_t bytes_of_receiver_rows(const PatchModel& model, const ReceiverRowSettings& rows);
+std::uint64_t bytes_of_receiver_rows(const PatchModel& model, const BuildSettings& decided);
 
 /// Those of patches and their mesh.
 BuiltScene built_scene(std::size_t patch_count, const DisplayMesh& mesh);

@@ -4,6 +4,7 @@
 #include "precompute/outputs/lightmap.h"
 #include "precompute/outputs/receiver_rows.h"
 #include "precompute/outputs/reconstruction_weights.h"
+#include "precompute/outputs/row_receivers.h"
 #include "precompute/outputs/surface_harmonics.h"
 
 namespace rebounce {
@@ -26,10 +27,10 @@ void make_outputs(std::span<const std::uint32_t> shown_patch, const RayTracer& t
   });
   const bool probes = settings.probes.grid[0] > 0 || settings.probes.spacing > 0;
   const bool harmonics = settings.surface_harmonics.ray_count > 0;
-  const bool rows = settings.receiver_rows.at_vertices;
+  const bool rows = settings.receiver_rows.any();
   if ((probes || harmonics || rows) && !settings.receivers.empty()) {
     report.warnings.emplace_back(
-        "light probes, surface harmonics and rows of vertices see patches that are no receivers "
+        "light probes, surface harmonics and rows of receivers see patches that are no receivers "
         "without their indirect light");
   }
   if (probes) {
@@ -48,11 +49,18 @@ void make_outputs(std::span<const std::uint32_t> shown_patch, const RayTracer& t
 
 void add_receiver_rows(std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
                        const BuildSettings& settings, TransferData& data, PhaseClock& clock) {
-  if (!settings.receiver_rows.at_vertices) return;
-  data.receiver_rows = clock.run("rows of vertices", [&](const Progress& part) {
-    return make_receiver_rows(data, shown_patch, tracer, settings.receiver_rows,
-                              settings.form_factors.seed, part);
-  });
+  const auto make = [&](const char* phase, const RowReceivers& receivers) {
+    return clock.run(phase, [&](const Progress& part) {
+      return make_receiver_rows(data, shown_patch, receivers, tracer, settings.receiver_rows,
+                                settings.form_factors.seed, part);
+    });
+  };
+  if (settings.receiver_rows.at_vertices) {
+    data.receiver_rows = make("rows of vertices", VertexReceivers(data, shown_patch));
+  }
+  if (settings.receiver_rows.at_texels) {
+    data.texel_rows = make("rows of texels", TexelReceivers(data, shown_patch));
+  }
 }
 
 }  // namespace rebounce

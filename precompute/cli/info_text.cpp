@@ -205,6 +205,7 @@ std::string outputs_text(const TransferData& data) {
   if (data.probes.size() > 0) text += fmt::format(", {} light probes", data.probes.size());
   if (!data.lightmap.empty()) {
     text += fmt::format(", a lightmap of {} x {}", data.lightmap.width, data.lightmap.height);
+    if (!data.texel_rows.empty()) text += " with rows of its own";
   }
   if (!data.surface_harmonics.empty()) text += ", harmonics for normal maps";
   return line("light at", text + (data.sky_cells.empty() ? "" : "; skies by their cells"));

@@ -178,9 +178,10 @@ BuildSettings settings_of(const PrecomputeOptions& chosen) {
   if (!chosen.precision.empty()) settings.precision = precision_named(chosen.precision);
   settings.operator_kind = operator_kind(chosen.operator_kind);
   if (chosen.reader == "web" && chosen.receivers_at != "patches") {
-    throw Error("pages show no rows of vertices; with --for web take --receivers-at patches");
+    throw Error("pages show no rows of receivers; with --for web take --receivers-at patches");
   }
   settings.receiver_rows.at_vertices = chosen.receivers_at == "vertices";
+  settings.receiver_rows.at_texels = chosen.receivers_at == "texels";
   settings.memory_limit_bytes =
       static_cast<std::uint64_t>(chosen.memory_limit_gib * static_cast<double>(1ULL << 30));
   return settings;
@@ -346,23 +347,25 @@ void add_output_options(CLI::App& command, PrecomputeOptions& chosen) {
   command
       .add_option("--receivers-at", chosen.receivers_at,
                   "Where light arrives by rows of its own: at patches alone, from which vertices "
-                  "mix theirs; or at vertices too, for scenes full of small things")
-      ->check(CLI::IsMember({"patches", "vertices"}))
+                  "mix theirs; or, for scenes full of small things, at vertices or at the texels "
+                  "of the lightmap too")
+      ->check(CLI::IsMember({"patches", "vertices", "texels"}))
       ->capture_default_str();
   ReceiverRowSettings& rows = chosen.settings.receiver_rows;
   command
-      .add_option("--receiver-rays", rows.ray_count, "Rays of each vertex, with rows of its own")
+      .add_option("--receiver-rays", rows.ray_count,
+                  "Rays of each vertex or texel, with rows of its own")
       ->check(CLI::Range(64, 1000000))
       ->capture_default_str();
   command
       .add_option("--receiver-tolerance", rows.tolerance,
-                  "Error of the light at vertices at which rows of their own end")
+                  "Error of the light at vertices or texels at which rows of their own end")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   command
       .add_option(
           "--receiver-sets", rows.most_sets,
-          "Sets of patches that a group of vertices sees at most; 9/8 bytes of a vertex each")
+          "Sets of patches that a group of 64 vertices or texels sees at most; 9/8 bytes of each")
       ->check(CLI::Range(4U, ReceiverRows::kMostSets))
       ->capture_default_str();
   command

@@ -11,32 +11,27 @@
 #include "precompute/outputs/receiver_sets.h"
 #include "precompute/outputs/receiver_views.h"
 #include "rebounce/error.h"
-#include "runtime/rays/triangle.h"
-#include "transfer/base/grouped.h"
 
 namespace rebounce {
 namespace {
 
-constexpr int kFewestVertexRays = 64;
+constexpr int kFewestReceiverRays = 64;
 constexpr std::uint32_t kGroup = ReceiverRows::kGroup, kSetStep = ReceiverRows::kSetStep;
 constexpr std::size_t kBatchGroups = 128;  // of which the rows are in memory at a time
 
 // Lights to choose sets by, of those that operators are fitted to.
 constexpr std::size_t kLights = 32;
 
-// Errors are relative to the light at a vertex or, if that is more, to this part of the light in
+// Errors are relative to the light at a receiver or, if that is more, to this part of the light in
 // the scene's root mean square.
 constexpr float kDim = 0.1F;
-
-// A vertex gets no row if its share of the surface is more than this part of a patch (lab/118).
-constexpr double kLargestShare = 0.5;
 
 // Of light on single patches, beside lamps (lab/109).
 constexpr double kSinglePatchWeight = 0.1;
 
 constexpr float kLargestByte = 127;
 
-/// Lights that the scene may have: what patches send, and what vertices get by their weights.
+/// Lights that the scene may have: what patches send, and what arrives there.
 struct Lights {
   std::vector<std::vector<Float3>> radiosity;  ///< [lights][n] lx
   Eigen::MatrixXf irradiance;                  ///< [n][lights] lx, mean of the channels
@@ -76,8 +71,8 @@ Lights light_scene(const TransferData& data, const RayTracer& tracer, std::uint6
   return lights;
 }
 
-/// What rows of one vertex add.
-struct VertexRow {
+/// What the row of one receiver adds.
+struct AddedRow {
   ViewRow added;          ///< by position of the tree, ascending
   Eigen::VectorXf light;  ///< [lights] that it gets then, lx
   double gain = 0;        ///< root mean square of what they add, relative to that
@@ -86,23 +81,19 @@ struct VertexRow {
 class RowBuilder {
  public:
   RowBuilder(const TransferData& data, std::span<const std::uint32_t> shown_patch,
-             const RayTracer& tracer, const ReceiverRowSettings& settings, std::uint64_t seed)
+             const RowReceivers& receivers, const RayTracer& tracer,
+             const ReceiverRowSettings& settings, std::uint64_t seed)
       : data_(data),
         shown_patch_(shown_patch),
+        receivers_(receivers),
         tracer_(tracer),
         settings_(settings),
         lights_(light_scene(data, tracer, seed)),
-        sources_(data.patches, lights_.radiosity),
-        triangles_(data.mesh.position.size(), [&](const auto& add) {
-          for (std::uint32_t t = 0; t < shown_patch.size(); ++t) {
-            if (shown_patch[t] == kNone) continue;
-            for (const std::uint32_t v : data.mesh.triangle[t]) add(v, t);
-          }
-        }) {}
+        sources_(data.patches, lights_.radiosity) {}
 
   ReceiverRows build(const Progress& progress) {
     look_from_patches(part_of(progress, 0, kPatchShare));
-    const std::vector<std::uint32_t> order = vertex_order();
+    const std::vector<std::uint32_t> order = receiver_order();
     rows_.patch = sources_.tree.patch;
     rows_.group_begin = {0};
     set_of_cluster_.assign(sources_.tree.clusters.size(), kNone);
@@ -121,7 +112,7 @@ class RowBuilder {
 
   /// The sets of a group and its values in them.
   struct Group {
-    std::vector<std::uint32_t> clusters, vertices;
+    std::vector<std::uint32_t> clusters, receivers;
     std::vector<float> scale;
     std::vector<std::int8_t> value;
   };
@@ -144,39 +135,17 @@ class RowBuilder {
     parallel.finish();
   }
 
-  /// Whether the triangles around a vertex are so small that it can show more than its patches:
-  /// on large walls, which have triangles as large as patches, weights do as well.
-  bool is_finer_than_patches(std::uint32_t vertex) const {
-    double area = 0, of_patches = 0;
-    for (const std::uint32_t t : triangles_[vertex]) {
-      const double size = area_of(corners_of(data_.mesh, t));
-      area += size;
-      of_patches += size * static_cast<double>(data_.patches.area[shown_patch_[t]]);
-    }
-    const double share = area / 3;  // the integral of the hat function
-    return share * area < kLargestShare * of_patches;
-  }
-
-  /// The vertices that may get rows, neighbours after each other.
-  std::vector<std::uint32_t> vertex_order() const {
-    const DisplayMesh& mesh = data_.mesh;
-    std::vector<std::uint32_t> shown;
-    PatchTable places;
-    for (std::uint32_t v = 0; v < mesh.position.size(); ++v) {
-      if (mesh.weight_begin[v] == mesh.weight_begin[v + 1] || !is_finer_than_patches(v)) continue;
-      shown.push_back(v);
-      places.area.push_back(1);
-      places.centroid.push_back(mesh.position[v]);
-      places.normal.push_back(mesh.normal[v]);
-    }
-    if (shown.empty()) return shown;
-    std::vector<std::uint32_t> order = build_cluster_tree(places, kGroup, kGroup).patch;
-    for (std::uint32_t& v : order) v = shown[v];
+  /// The receivers that may get rows, neighbours after each other.
+  std::vector<std::uint32_t> receiver_order() const {
+    const RowReceivers::Candidates found = receivers_.candidates();
+    if (found.receiver.empty()) return {};
+    std::vector<std::uint32_t> order = build_cluster_tree(found.place, kGroup, kGroup).patch;
+    for (std::uint32_t& k : order) k = found.receiver[k];
     return order;
   }
 
-  void add_batch(std::span<const std::uint32_t> vertices) {
-    std::vector<VertexRow> found(vertices.size());
+  void add_batch(std::span<const std::uint32_t> receivers) {
+    std::vector<AddedRow> found(receivers.size());
     const double sight = mean_patch_size();
 #pragma omp parallel
     {
@@ -184,10 +153,10 @@ class RowBuilder {
                             settings_.ray_count);
       std::vector<double> sum(data_.patches.size(), 0.0);
 #pragma omp for schedule(dynamic, 16)
-      for (std::size_t k = 0; k < vertices.size(); ++k) {
+      for (std::size_t k = 0; k < receivers.size(); ++k) {
         ViewRow row;
-        viewer.look_from_vertex(vertices[k], triangles_[vertices[k]], sight, row);
-        if (!row.empty()) found[k] = compare(vertices[k], row, sum);
+        receivers_.look(receivers[k], sight, viewer, row);
+        if (!row.empty()) found[k] = compare(receivers[k], row, sum);
       }
     }
     std::vector<std::uint32_t> kept;
@@ -199,17 +168,18 @@ class RowBuilder {
     for (std::size_t g = 0; g < groups.size(); ++g) {
       const std::span<const std::uint32_t> all(kept);
       const std::size_t first = g * kGroup;
-      groups[g] = make_group(vertices, found,
+      groups[g] = make_group(receivers, found,
                              all.subspan(first, std::min<std::size_t>(kGroup, all.size() - first)));
     }
     for (const Group& group : groups) append(group);
   }
 
-  /// The row less those of the patches in the weights of the vertex. `sum` [n] is zero before and
+  /// The row less those of the patches in the weights of the receiver. `sum` [n] is zero before and
   /// after.
-  VertexRow compare(std::uint32_t vertex, const ViewRow& row, std::vector<double>& sum) const {
-    const DisplayMesh& mesh = data_.mesh;
-    VertexRow result;
+  AddedRow compare(std::uint32_t receiver, const ViewRow& row, std::vector<double>& sum) const {
+    AddedRow result;
+    ViewRow weights;
+    receivers_.find_weights(receiver, weights);
     std::vector<std::uint32_t> touched;
     const auto add = [&](const ViewRow& from, double weight) {
       for (const auto& [patch, part] : from) {
@@ -220,9 +190,9 @@ class RowBuilder {
     };
     result.light.setZero(lights_.usual.size());
     add(row, 1);
-    for (std::uint32_t k = mesh.weight_begin[vertex]; k < mesh.weight_begin[vertex + 1]; ++k) {
-      add(patch_rows_[mesh.weight_patch[k]], -static_cast<double>(mesh.weight[k]));
-      result.light += mesh.weight[k] * lights_.irradiance.row(mesh.weight_patch[k]).transpose();
+    for (const auto& [patch, weight] : weights) {
+      add(patch_rows_[patch], -static_cast<double>(weight));
+      result.light += weight * lights_.irradiance.row(patch).transpose();
     }
     std::ranges::sort(touched);
     Eigen::VectorXf added = Eigen::VectorXf::Zero(lights_.usual.size());
@@ -241,7 +211,7 @@ class RowBuilder {
     return result;
   }
 
-  GroupRows rows_of(std::span<const VertexRow> found, std::span<const std::uint32_t> kept) const {
+  GroupRows rows_of(std::span<const AddedRow> found, std::span<const std::uint32_t> kept) const {
     GroupRows rows;
     for (const std::uint32_t k : kept) {
       for (const ViewEntry& entry : found[k].added) rows.position.push_back(entry.patch);
@@ -264,11 +234,11 @@ class RowBuilder {
     return rows;
   }
 
-  Group make_group(std::span<const std::uint32_t> vertices, std::span<const VertexRow> found,
+  Group make_group(std::span<const std::uint32_t> receivers, std::span<const AddedRow> found,
                    std::span<const std::uint32_t> kept) const {
     const GroupRows rows = rows_of(found, kept);
     Group group;
-    for (const std::uint32_t k : kept) group.vertices.push_back(vertices[k]);
+    for (const std::uint32_t k : kept) group.receivers.push_back(receivers[k]);
     group.clusters =
         choose_sets(sources_, rows, {settings_.tolerance, settings_.most_sets, kSinglePatchWeight});
     round(parts_of_sets(rows, group.clusters), group);
@@ -354,9 +324,9 @@ class RowBuilder {
     }
     rows_.scale.insert(rows_.scale.end(), group.scale.begin(), group.scale.end());
     rows_.value.insert(rows_.value.end(), group.value.begin(), group.value.end());
-    rows_.vertex.insert(rows_.vertex.end(), group.vertices.begin(), group.vertices.end());
+    rows_.receiver.insert(rows_.receiver.end(), group.receivers.begin(), group.receivers.end());
     rows_.group_begin.push_back(static_cast<std::uint32_t>(rows_.entry_set.size()));
-    rows_.vertex.resize(std::size_t{kGroup} * rows_.group_count(), kNone);
+    rows_.receiver.resize(std::size_t{kGroup} * rows_.group_count(), kNone);
   }
 
   double mean_patch_size() const {
@@ -366,12 +336,12 @@ class RowBuilder {
 
   const TransferData& data_;
   std::span<const std::uint32_t> shown_patch_;
+  const RowReceivers& receivers_;
   const RayTracer& tracer_;
   const ReceiverRowSettings& settings_;
   const Lights lights_;
   const ReceiverSources sources_;
-  const Grouped<std::uint32_t> triangles_;  ///< of each vertex, those that show a patch
-  std::vector<ViewRow> patch_rows_;         ///< [n]
+  std::vector<ViewRow> patch_rows_;  ///< [n]
   std::vector<std::uint32_t> set_of_cluster_;
   ReceiverRows rows_;
 };
@@ -379,18 +349,19 @@ class RowBuilder {
 }  // namespace
 
 ReceiverRows make_receiver_rows(const TransferData& data,
-                                std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
+                                std::span<const std::uint32_t> shown_patch,
+                                const RowReceivers& receivers, const RayTracer& tracer,
                                 const ReceiverRowSettings& settings, std::uint64_t seed,
                                 const Progress& progress) {
-  if (settings.ray_count < kFewestVertexRays) {
-    throw Error("rows of receivers: a vertex needs at least 64 rays");
+  if (settings.ray_count < kFewestReceiverRays) {
+    throw Error("rows of receivers: a receiver needs at least 64 rays");
   }
   if (!(settings.tolerance >= 0) || settings.most_sets < kSetStep ||
       settings.most_sets > ReceiverRows::kMostSets) {
     throw Error("rows of receivers: the tolerance must be at least 0, the sets from 4 to 1024");
   }
   if (!data.transfer) throw Error("rows of receivers need an operator; make one");
-  return RowBuilder(data, shown_patch, tracer, settings, seed).build(progress);
+  return RowBuilder(data, shown_patch, receivers, tracer, settings, seed).build(progress);
 }
 
 }  // namespace rebounce

@@ -23,6 +23,10 @@ constexpr double kDualPart = 0.75;  // lab/109
 // The weight of places that are not seen, beside that of those that are: it decides where none is.
 constexpr double kUnseen = 1.0 / 64;
 
+// A point of which a larger part of the rays meet backs of surfaces lies inside of a body, as a
+// probe does (light_probes.h, lab/127).
+constexpr double kMostBacks = 0.25;
+
 /// Points on the triangles around a vertex, evenly by area.
 class RingPoints {
  public:
@@ -69,6 +73,10 @@ ReceiverViewer::ReceiverViewer(const DisplayMesh& mesh, std::span<const std::uin
 
 void ReceiverViewer::trace() {
   make_hemisphere_rays(point_, tracer_, kDirectionShift, ray_);
+  intersect();
+}
+
+void ReceiverViewer::intersect() {
   tracer_.intersect(ray_, hit_);
   for (std::size_t k = 0; k < ray_.size(); ++k) {
     prefer_lit_side(mesh_, tracer_, ray_[k], hit_[k], scratch_);
@@ -150,6 +158,28 @@ void ReceiverViewer::look_from_vertex(std::uint32_t vertex,
   for (std::size_t k = 0; k < height_.size(); ++k) {
     const double dual = 3 * height_[k] - 1 - mean * height_[k];
     add(patch_at(mesh_, shown_patch_, hit_[k]), (height_[k] + dual_part * dual) / heights);
+  }
+  take(row);
+}
+
+void ReceiverViewer::look_from_point(const PatchPoint& point, const Float3& shading_normal,
+                                     ViewRow& row) {
+  row.clear();
+  const PointSequence directions = direction_sequence(kDirectionShift);
+  const glm::vec3 front = to_glm(point.normal);
+  NormalFrame frame;
+  for (std::uint32_t k = 0; k < ray_.size(); ++k) {
+    glm::vec3 direction = frame.turn(shading_normal, to_cosine_direction(directions[k]));
+    const float away = glm::dot(direction, front);
+    if (away < 0) direction -= 2 * away * front;
+    ray_[k] = make_free_ray(point, direction, tracer_);
+  }
+  intersect();
+  const auto backs =
+      std::ranges::count_if(hit_, [this](const Hit& hit) { return meets_back(mesh_, hit); });
+  if (static_cast<double>(backs) > kMostBacks * static_cast<double>(hit_.size())) return;
+  for (const Hit& hit : hit_) {
+    add(patch_at(mesh_, shown_patch_, hit), 1 / static_cast<double>(hit_.size()));
   }
   take(row);
 }

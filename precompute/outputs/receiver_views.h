@@ -1,6 +1,6 @@
 #pragma once
 
-// What patches and vertices of the display mesh see, along rays.
+// What patches, vertices of the display mesh and single points see, along rays.
 
 #include <cstdint>
 #include <span>
@@ -38,8 +38,15 @@ class ReceiverViewer {
   void look_from_vertex(std::uint32_t vertex, std::span<const std::uint32_t> triangles,
                         double sight, ViewRow& row);
 
+  /// The light at a point of the surface, as the unit vector `shading_normal` receives it, which is
+  /// less than 90 degrees from that of the surface. Directions below the surface are mirrored at
+  /// it. A point of which many rays meet backs, as on a floor below a box, sees nothing.
+  void look_from_point(const PatchPoint& point, const Float3& shading_normal, ViewRow& row);
+
  private:
+  /// Follows one ray of the hemisphere from each point.
   void trace();
+  void intersect();
   /// Replaces places that are not seen by those that are; returns the part that is.
   double keep_seen(double sight);
   void add(std::uint32_t patch, double part);

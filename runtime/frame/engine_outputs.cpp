@@ -56,7 +56,13 @@ void lightmap_irradiance(Engine& engine, std::span<Float3> irradiance) {
   const std::span<Float3> at_vertices = engine.parts().vertex_irradiance;
   // Clamped after the interpolation, not before it.
   write_unclamped(engine, at_vertices);
+  if (data.texel_rows.empty()) {
+    light_at_texels(data.lightmap, data.mesh, at_vertices, irradiance, engine.scheduler());
+    return;
+  }
   interpolate_at_texels(data.lightmap, data.mesh, at_vertices, irradiance, engine.scheduler());
+  engine.parts().texel_products.add(engine.radiosity(), irradiance, engine.scheduler());
+  clamp_light(irradiance, engine.scheduler());
 }
 
 void probe_light(const Engine& engine, std::span<ProbeLight> light) {

@@ -43,7 +43,8 @@ Engine::Parts::Parts(std::shared_ptr<const TransferData> transfer_data,
                      const EngineSettings& settings)
     : data(checked(std::move(transfer_data))),
       scheduler(settings.scheduler),
-      receiver_products(data->receiver_rows, data->patches.area) {
+      receiver_products(data->receiver_rows, data->patches.area),
+      texel_products(data->texel_rows, data->patches.area) {
   tracer = std::make_shared<const RayTracer>(make_surface_tracer(data->mesh));
   direct_lighting = std::make_shared<DirectLighting>(*data, *tracer, settings.direct_lighting);
   const std::size_t n = data->patches.size();

@@ -68,6 +68,7 @@ struct Engine::Parts {
   std::vector<Float3> vertex_irradiance;  ///< [v] if there is a lightmap
   std::vector<SurfaceLight> patch_light;  ///< [n] if there are surface harmonics
   mutable ReceiverProducts receiver_products;
+  ReceiverProducts texel_products;
 };
 
 }  // namespace rebounce

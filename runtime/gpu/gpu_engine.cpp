@@ -34,18 +34,23 @@ enum class Stage : std::uint8_t {
   kExpandClusters,
   kExpandPositions,
   kRadiosity,
-  kSetLight,
-  kReceiverRows,
+  kSetsOfVertices,
+  kRowsOfVertices,
   kVertices,
   kVertexValues,  // as kVertices, with negative sums
+  kSetsOfTexels,
+  kRowsOfTexels,
   kTexels,
   kProbes,
 };
-constexpr std::array<const char*, 13> kStageNames = {
-    "initial exitance", "project positions", "project clusters",
-    "couplings",        "expand clusters",   "expand positions",
-    "radiosity",        "light of sets",     "rows",
-    "vertices",         "texel corners",     "texels",
+constexpr std::array<const char*, 15> kStageNames = {
+    "initial exitance", "project positions",
+    "project clusters", "couplings",
+    "expand clusters",  "expand positions",
+    "radiosity",        "sets of vertices",
+    "rows of vertices", "vertices",
+    "texel corners",    "sets of texels",
+    "rows of texels",   "texels",
     "probes",
 };
 constexpr std::size_t kStageCount = kStageNames.size();
@@ -86,8 +91,8 @@ struct GpuEngine::Parts {
         couple(gl, "couple.glsl", ShaderSources::kCouple),
         expand(gl, "expand.glsl", ShaderSources::kExpand),
         radiosity_shader(gl, "radiosity.glsl", ShaderSources::kRadiosity),
-        average_sets(gl, "set_light.glsl", ShaderSources::kSetLight),
-        add_rows(gl, "receiver_rows.glsl", ShaderSources::kReceiverRows),
+        set_shader(gl, "set_light.glsl", ShaderSources::kSetLight),
+        row_shader(gl, "receiver_rows.glsl", ShaderSources::kReceiverRows),
         vertices(gl, "vertex_irradiance.glsl", ShaderSources::kVertexIrradiance),
         texels(gl, "lightmap_irradiance.glsl", ShaderSources::kLightmapIrradiance),
         probes(gl, "probe_light.glsl", ShaderSources::kProbeLight),
@@ -105,17 +110,11 @@ struct GpuEngine::Parts {
         strip_entries(table(tables.strip_entries)),
         vertex_begin(table(vertex_begins(scene.mesh))),
         vertex_weights(table(pairs(scene.mesh.weight_patch, scene.mesh.weight))),
-        set_patches(table(pairs(scene.receiver_rows.patch, areas_in_order()))),
-        sets(table(scene.receiver_rows.set)),
-        row_begin(table(scene.receiver_rows.group_begin)),
-        row_entries(table(pairs(scene.receiver_rows.entry_set, scene.receiver_rows.scale))),
-        row_vertices(table(scene.receiver_rows.vertex)),
-        row_values(table(scene.receiver_rows.value)),
-        set_light(zeros(scene.receiver_rows.set.size() * 4 * sizeof(float))),
-        added(zeros(scene.receiver_rows.empty() ? 0 : triple_bytes(vertex_count))),
+        vertex_rows(*this, scene.receiver_rows, vertex_count),
         texel_triangles(table(scene.lightmap.triangle)),
         texel_weights(table(scene.lightmap.weight)),
         triangles(scene.lightmap.empty() ? zeros(0) : table(scene.mesh.triangle)),
+        texel_rows(*this, scene.texel_rows, scene.lightmap.triangle.size()),
         probe_begin(table(scene.probes.entry_begin)),
         probe_patches(table(scene.probes.entry_patch)),
         probe_weights(table(scene.probes.entry_weight)),
@@ -155,11 +154,25 @@ struct GpuEngine::Parts {
     return words;
   }
 
-  /// Of patches, in the order in which sets of rows have them.
-  std::vector<float> areas_in_order() const {
+  /// The tables of rows of receivers, and what they write.
+  struct RowBuffers {
+    RowBuffers(Parts& parts, const ReceiverRows& rows, std::size_t receiver_count)
+        : patches(parts.table(pairs(rows.patch, parts.areas_of(rows.patch)))),
+          sets(parts.table(rows.set)),
+          begin(parts.table(rows.group_begin)),
+          entries(parts.table(pairs(rows.entry_set, rows.scale))),
+          receivers(parts.table(rows.receiver)),
+          values(parts.table(rows.value)),
+          set_light(parts.zeros(rows.set.size() * 4 * sizeof(float))),
+          added(parts.zeros(rows.empty() ? 0 : triple_bytes(receiver_count))) {}
+
+    StorageBuffer patches, sets, begin, entries, receivers, values, set_light, added;
+  };
+
+  std::vector<float> areas_of(std::span<const std::uint32_t> patches) const {
     std::vector<float> areas;
-    areas.reserve(scene.receiver_rows.patch.size());
-    for (const std::uint32_t i : scene.receiver_rows.patch) areas.push_back(scene.patches.area[i]);
+    areas.reserve(patches.size());
+    for (const std::uint32_t i : patches) areas.push_back(scene.patches.area[i]);
     return areas;
   }
 
@@ -186,8 +199,12 @@ struct GpuEngine::Parts {
         tables.position_count);
     set(Stage::kExpandPositions, strip_count);
     set(Stage::kRadiosity, tables.position_count);
-    set(Stage::kSetLight, static_cast<std::uint32_t>(scene.receiver_rows.set.size()));
-    set(Stage::kReceiverRows, static_cast<std::uint32_t>(scene.receiver_rows.group_count()));
+    const auto set_rows = [&](Stage of_sets, Stage of_rows, const ReceiverRows& rows) {
+      set(of_sets, static_cast<std::uint32_t>(rows.set.size()));
+      set(of_rows, static_cast<std::uint32_t>(rows.group_count()));
+    };
+    set_rows(Stage::kSetsOfVertices, Stage::kRowsOfVertices, scene.receiver_rows);
+    set_rows(Stage::kSetsOfTexels, Stage::kRowsOfTexels, scene.texel_rows);
     set(Stage::kVertices, static_cast<std::uint32_t>(vertex_count));
     set(Stage::kVertexValues, static_cast<std::uint32_t>(vertex_count));
     blocks[static_cast<std::size_t>(Stage::kVertexValues)].keeps_negative = 1;
@@ -268,6 +285,14 @@ struct GpuEngine::Parts {
     gl->memory_barrier(Gl::kAllBarriers);
   }
 
+  void add_rows(Stage of_sets, Stage of_rows, const RowBuffers& rows, unsigned of_patches) {
+    run(of_sets, set_shader, 1,
+        {of_patches, rows.patches.name(), rows.sets.name(), rows.set_light.name()});
+    run(of_rows, row_shader, 1,
+        {rows.set_light.name(), rows.begin.name(), rows.entries.name(), rows.receivers.name(),
+         rows.values.name(), rows.added.name()});
+  }
+
   void relight(const GpuBuffers& buffers) {
     timer.begin();
     const auto or_own = [](unsigned name, const StorageBuffer& own) {
@@ -293,25 +318,21 @@ struct GpuEngine::Parts {
     run(Stage::kRadiosity, radiosity_shader, kThreads,
         {indirect, reflectance.name(), all, positions.name(), initial_exitance.name(), 0,
          arriving.name()});
-    if (buffers.vertex_irradiance != 0 || buffers.lightmap_irradiance != 0) {
-      run(Stage::kSetLight, average_sets, 1,
-          {all, set_patches.name(), sets.name(), set_light.name()});
-      run(Stage::kReceiverRows, add_rows, 1,
-          {set_light.name(), row_begin.name(), row_entries.name(), row_vertices.name(),
-           row_values.name(), added.name()});
-    }
+    if (buffers.vertex_irradiance != 0 || buffers.lightmap_irradiance != 0)
+      add_rows(Stage::kSetsOfVertices, Stage::kRowsOfVertices, vertex_rows, all);
     if (buffers.vertex_irradiance != 0) {
       run(Stage::kVertices, vertices, kThreads,
-          {indirect, vertex_begin.name(), vertex_weights.name(), added.name(),
+          {indirect, vertex_begin.name(), vertex_weights.name(), vertex_rows.added.name(),
            buffers.vertex_irradiance});
     }
     if (buffers.lightmap_irradiance != 0) {
       run(Stage::kVertexValues, vertices, kThreads,
-          {indirect, vertex_begin.name(), vertex_weights.name(), added.name(),
+          {indirect, vertex_begin.name(), vertex_weights.name(), vertex_rows.added.name(),
            vertex_values.name()});
+      add_rows(Stage::kSetsOfTexels, Stage::kRowsOfTexels, texel_rows, all);
       run(Stage::kTexels, texels, kThreads,
           {vertex_values.name(), texel_triangles.name(), texel_weights.name(), triangles.name(),
-           buffers.lightmap_irradiance});
+           texel_rows.added.name(), buffers.lightmap_irradiance});
     }
     if (buffers.probe_light != 0) {
       run(Stage::kProbes, probes, kThreads,
@@ -327,12 +348,14 @@ struct GpuEngine::Parts {
   std::shared_ptr<const GlFunctions> gl;
   std::size_t patch_count, vertex_count;
   std::array<StageBlock, kStageCount> blocks{};
-  ComputeProgram initial_exitance_shader, project, couple, expand, radiosity_shader, average_sets,
-      add_rows, vertices, texels, probes;
+  ComputeProgram initial_exitance_shader, project, couple, expand, radiosity_shader, set_shader,
+      row_shader, vertices, texels, probes;
   StorageBuffer reflectance, emitted_exitance, positions, scales, bases, couplings, projections,
-      sides, outputs, inputs, strips, strip_entries, vertex_begin, vertex_weights, set_patches,
-      sets, row_begin, row_entries, row_vertices, row_values, set_light, added, texel_triangles,
-      texel_weights, triangles, probe_begin, probe_patches, probe_weights, probe_sky, vertex_values;
+      sides, outputs, inputs, strips, strip_entries, vertex_begin, vertex_weights;
+  RowBuffers vertex_rows;
+  StorageBuffer texel_triangles, texel_weights, triangles;
+  RowBuffers texel_rows;
+  StorageBuffer probe_begin, probe_patches, probe_weights, probe_sky, vertex_values;
   StorageBuffer initial_exitance, indirect_irradiance, radiosity, light, arriving;
   StorageBuffer stages;
   GpuDirectLight direct_light;

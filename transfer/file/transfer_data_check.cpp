@@ -45,7 +45,8 @@ class Checker {
     check_probes();
     check_lightmap();
     check_surface_harmonics();
-    check_receiver_rows();
+    check_receiver_rows(data_.receiver_rows, tensor::kVertexRows, data_.mesh.position.size());
+    check_texel_rows();
     check_exchange();
   }
 
@@ -337,31 +338,42 @@ class Checker {
         light.sky_cells);
   }
 
-  void check_receiver_rows() const {
-    const ReceiverRows& rows_of = data_.receiver_rows;
+  void check_receiver_rows(const ReceiverRows& rows_of, const tensor::RowNames& names,
+                           std::size_t receiver_count) const {
     if (rows_of.empty()) return;
     const std::size_t n = data_.patches.size(), entries = rows_of.entry_set.size();
-    rows("receiver.patch", rows_of.patch.size(), n);
-    rows("receiver.scale", rows_of.scale.size(), entries);
-    rows("receiver.vertex", rows_of.vertex.size(), ReceiverRows::kGroup * rows_of.group_count());
-    rows(tensor::kReceiverValue, rows_of.value.size(), ReceiverRows::kGroup * entries);
-    numbers("receiver.scale", rows_of.scale, kNotNegative);
-    each_once("receiver.patch", rows_of.patch, n);
-    each_once("receiver.vertex", rows_of.vertex, data_.mesh.position.size(), kNone);
+    rows(names.patch, rows_of.patch.size(), n);
+    rows(names.scale, rows_of.scale.size(), entries);
+    rows(names.receiver, rows_of.receiver.size(), ReceiverRows::kGroup * rows_of.group_count());
+    rows(names.value, rows_of.value.size(), ReceiverRows::kGroup * entries);
+    numbers(names.scale, rows_of.scale, kNotNegative);
+    each_once(names.patch, rows_of.patch, n);
+    each_once(names.receiver, rows_of.receiver, receiver_count, kNone);
     for (std::size_t k = 0; k < rows_of.set.size(); ++k) {
       const auto [begin, end] = rows_of.set[k];
-      if (begin >= end || end > n)
-        refuse("receiver.set", "entry " + std::to_string(k) + " is empty");
+      if (begin >= end || end > n) refuse(names.set, "entry " + std::to_string(k) + " is empty");
     }
     for (std::size_t e = 0; e < entries; ++e) {
-      index("receiver.entry_set", e, rows_of.entry_set[e], rows_of.set.size());
+      index(names.entry_set, e, rows_of.entry_set[e], rows_of.set.size());
     }
-    begins<std::uint32_t>(tensor::kReceiverBegin, rows_of.group_begin, entries);
+    begins<std::uint32_t>(names.begin, rows_of.group_begin, entries);
     for (std::size_t g = 0; g < rows_of.group_count(); ++g) {
       const std::uint32_t sets = rows_of.group_begin[g + 1] - rows_of.group_begin[g];
       if (sets % ReceiverRows::kSetStep == 0 && sets <= ReceiverRows::kMostSets) continue;
-      refuse_entry(tensor::kReceiverBegin, g + 1, std::to_string(rows_of.group_begin[g + 1]),
+      refuse_entry(names.begin, g + 1, std::to_string(rows_of.group_begin[g + 1]),
                    "a multiple of 4, at most 1024, after the one before it");
+    }
+  }
+
+  /// Texels that show nothing have no rows.
+  void check_texel_rows() const {
+    const std::vector<std::uint32_t>& shown = data_.lightmap.triangle;
+    check_receiver_rows(data_.texel_rows, tensor::kTexelRows, shown.size());
+    for (std::size_t k = 0; k < data_.texel_rows.receiver.size(); ++k) {
+      const std::uint32_t texel = data_.texel_rows.receiver[k];
+      if (texel == kNone || shown[texel] != kNone) continue;
+      refuse_entry(tensor::kTexelRows.receiver, k, std::to_string(texel),
+                   "a texel that shows a triangle");
     }
   }
 

@@ -44,8 +44,18 @@ inline constexpr char kLightmapSize[] = "lightmap.size";
 inline constexpr char kSkyBegin[] = "sky.entry_begin";
 inline constexpr char kSurfaceSky[] = "surface_harmonics.sky";
 inline constexpr char kSurfaceSkyBegin[] = "surface_harmonics.sky_begin";
-inline constexpr char kReceiverBegin[] = "receiver.group_begin";
-inline constexpr char kReceiverValue[] = "receiver.value";
+
+/// Of ReceiverRows.
+struct RowNames {
+  const char *begin, *patch, *set, *entry_set, *scale, *receiver, *value;
+};
+inline constexpr RowNames kVertexRows = {
+    "receiver.group_begin", "receiver.patch",  "receiver.set",  "receiver.entry_set",
+    "receiver.scale",       "receiver.vertex", "receiver.value"};
+inline constexpr RowNames kTexelRows = {"texel_receiver.group_begin", "texel_receiver.patch",
+                                        "texel_receiver.set",         "texel_receiver.entry_set",
+                                        "texel_receiver.scale",       "texel_receiver.texel",
+                                        "texel_receiver.value"};
 inline constexpr char kDenseTiles[] = "transfer.dense.tiles";
 inline constexpr char kDenseChannelMatrix[] = "transfer.dense.channel_matrix";
 }  // namespace tensor
@@ -179,13 +189,13 @@ void visit_tensors_of_lightmap(Map& map, Visit&& visit) {
 
 // All but the values.
 template <typename Rows, typename Visit>
-void visit_tensors_of_receiver_rows(Rows& rows, Visit&& visit) {
-  visit(tensor::kReceiverBegin, rows.group_begin);
-  visit("receiver.patch", rows.patch);
-  visit("receiver.set", rows.set);
-  visit("receiver.entry_set", rows.entry_set);
-  visit("receiver.scale", rows.scale);
-  visit("receiver.vertex", rows.vertex);
+void visit_tensors_of_receiver_rows(Rows& rows, const tensor::RowNames& names, Visit&& visit) {
+  visit(names.begin, rows.group_begin);
+  visit(names.patch, rows.patch);
+  visit(names.set, rows.set);
+  visit(names.entry_set, rows.entry_set);
+  visit(names.scale, rows.scale);
+  visit(names.receiver, rows.receiver);
 }
 
 template <typename Maps, typename Visit>

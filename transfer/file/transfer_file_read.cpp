@@ -361,13 +361,12 @@ SurfaceHarmonics read_surface_harmonics(const SafetensorsFile& file) {
 }
 
 /// A file without rows of receivers has none of their tensors.
-ReceiverRows read_receiver_rows(const SafetensorsFile& file) {
+ReceiverRows read_receiver_rows(const SafetensorsFile& file, const tensor::RowNames& names) {
   ReceiverRows rows;
-  if (!file.tensors().contains(tensor::kReceiverBegin)) return rows;
-  visit_tensors_of_receiver_rows(rows, TensorReader(file));
+  if (!file.tensors().contains(names.begin)) return rows;
+  visit_tensors_of_receiver_rows(rows, names, TensorReader(file));
   const auto value = file.tensor<std::int8_t>(
-      tensor::kReceiverValue, {ReceiverRows::kGroup * std::uint64_t{rows.entry_set.size()}},
-      TensorType::kI8);
+      names.value, {ReceiverRows::kGroup * std::uint64_t{rows.entry_set.size()}}, TensorType::kI8);
   rows.value.assign(value.begin(), value.end());
   return rows;
 }
@@ -406,7 +405,8 @@ TransferData read_transfer_file(const SafetensorsFile& file) {
   read_probes(file, data);
   data.lightmap = read_lightmap(file);
   data.surface_harmonics = read_surface_harmonics(file);
-  data.receiver_rows = read_receiver_rows(file);
+  data.receiver_rows = read_receiver_rows(file, tensor::kVertexRows);
+  data.texel_rows = read_receiver_rows(file, tensor::kTexelRows);
   if (file.tensors().contains(tensor::kEmittedIrradiance)) {
     const TensorReader read(file);
     read(tensor::kEmittedIrradiance, data.emitted_irradiance);

@@ -158,11 +158,11 @@ void collect_lightmap(const Lightmap& map, TensorCollector& collector) {
 }
 
 /// Without rows of receivers their tensors are left out.
-void collect_receiver_rows(const ReceiverRows& rows, TensorCollector& collector) {
+void collect_receiver_rows(const ReceiverRows& rows, const tensor::RowNames& names,
+                           TensorCollector& collector) {
   if (rows.empty()) return;
-  visit_tensors_of_receiver_rows(rows, collector);
-  collector.add<std::int8_t>(tensor::kReceiverValue, {rows.value.size()}, rows.value,
-                             TensorType::kI8);
+  visit_tensors_of_receiver_rows(rows, names, collector);
+  collector.add<std::int8_t>(names.value, {rows.value.size()}, rows.value, TensorType::kI8);
 }
 
 std::string names_text(const TransferData& data) {
@@ -215,7 +215,8 @@ void with_transfer_file(const TransferData& data, const auto& take) {
   collect_probes(data.probes, collector);
   collect_lightmap(data.lightmap, collector);
   collect_surface_harmonics(data.surface_harmonics, collector);
-  collect_receiver_rows(data.receiver_rows, collector);
+  collect_receiver_rows(data.receiver_rows, tensor::kVertexRows, collector);
+  collect_receiver_rows(data.texel_rows, tensor::kTexelRows, collector);
   collect_exchange(data.exchange, collector);
   if (!data.links.empty()) visit_tensors_of_links(data.links, collector);
   collect_operator(data.transfer.get(), collector);

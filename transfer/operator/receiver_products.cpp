@@ -68,7 +68,7 @@ void ReceiverProducts::add_group(std::size_t group, std::span<Float3> irradiance
   kernels().blocks.bases_q8.expand(rows_->value.data(), {&part, 1}, {coefficient.data(), 0},
                                    {sum.data(), kSize, kChannelCount});
   for (std::size_t i = 0; i < kSize; ++i) {
-    const std::uint32_t v = rows_->vertex[group * kSize + i];
+    const std::uint32_t v = rows_->receiver[group * kSize + i];
     if (v == kNone) continue;
     for (std::size_t c = 0; c < kChannelCount; ++c) irradiance[v][c] += sum[c * kSize + i];
   }

@@ -9,14 +9,15 @@
 
 namespace rebounce {
 
-/// Adds to light at vertices what rows of receivers do. Allocates when it is made, and not after.
+/// Adds to light at receivers what their rows do. Allocates when it is made, and not after.
 /// `rows` and `area` [n] must outlive it.
 class ReceiverProducts {
  public:
   ReceiverProducts(const ReceiverRows& rows, std::span<const float> area);
 
-  /// Adds the rows' part of patches of `radiosity` [n] in lx to `irradiance` [v] in lx; vertices
-  /// without rows stay as they are. The same bits for any `scheduler` and instruction set.
+  /// Adds the rows' part of patches of `radiosity` [n] in lx to `irradiance` in lx, one of each
+  /// receiver; those without rows stay as they are. The same bits for any `scheduler` and
+  /// instruction set.
   void add(std::span<const Float3> radiosity, std::span<Float3> irradiance,
            const Scheduler& scheduler = {});
 

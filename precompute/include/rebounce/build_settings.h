@@ -89,18 +89,22 @@ struct SurfaceHarmonicSettings {
   std::uint64_t seed = 1;  ///< of the sample points
 };
 
-/// What vertices of the display mesh receive beyond what their patches do (ReceiverRows).
+/// What vertices of the display mesh or texels of the lightmap receive beyond what their patches do
+/// (ReceiverRows).
 struct ReceiverRowSettings {
   bool at_vertices = false;  ///< whether vertices have rows of their own
-  /// Rays of each vertex, at least 64. The noise of what vertices show falls with the number;
+  bool at_texels = false;    ///< whether texels have; they need a lightmap
+  /// Rays of each receiver, at least 64. The noise of what receivers show falls with the number;
   /// offline time grows with it.
   int ray_count = 1024;
-  /// Relative error of the light, root mean square over lights, that rows may leave; vertices whose
-  /// weights err less have none. A smaller one takes more bytes.
+  /// Relative error of the light, root mean square over lights, that rows may leave; receivers
+  /// whose weights err less have none. A smaller one takes more bytes.
   double tolerance = 0.02;
-  /// Sets of patches that a group of 64 vertices has at most, from 4 to 1024. A vertex takes 9/8
+  /// Sets of patches that a group of 64 receivers has at most, from 4 to 1024. A receiver takes 9/8
   /// bytes for each, and 4 more.
   std::uint32_t most_sets = 128;
+
+  bool any() const { return at_vertices || at_texels; }
 };
 
 /// The default of BuildSettings::tolerance.

@@ -215,7 +215,10 @@ LitMesh light_mesh(const TransferData& data, const RayTracer& tracer, const Pict
   const SurfaceLighter lighter(data, tracer, light, settings.samples_per_vertex,
                                settings.emitter_samples);
   light_vertices(VertexLighter(lighter, mesh, lit.position), lit);
-  if (count_in_texture > 0) lit.texture = light_texture(data, lighter, in_texture, lit.exposure);
+  if (count_in_texture > 0) {
+    lit.texture =
+        light_texture(data, lighter, added_at_texels(data, light), in_texture, lit.exposure);
+  }
   return lit;
 }
 

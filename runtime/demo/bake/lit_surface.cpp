@@ -25,9 +25,11 @@ std::vector<glm::vec3> SurfaceLighter::shown(std::uint32_t first, std::span<cons
                                              float exposure_scale, bool textured) const {
   std::vector<glm::vec3> light = direct_irradiance(first, pieces.size(), samples);
   for (std::size_t k = 0; k < pieces.size(); ++k) {
-    const auto& [point, width] = pieces[k];
-    const glm::vec3 irradiance = light[k] + interpolate(data_.mesh, vertex_light_.sky, point) +
-                                 interpolate(data_.mesh, vertex_light_.bounced, point);
+    const auto& [point, width, added] = pieces[k];
+    const glm::vec3 bounced = glm::max(
+        interpolate(data_.mesh, vertex_light_.bounced, point) + to_glm(added), glm::vec3(0));
+    const glm::vec3 irradiance =
+        light[k] + interpolate(data_.mesh, vertex_light_.sky, point) + bounced;
     const glm::vec3 albedo =
         textured ? surface_.albedo(point, width) : surface_.untextured_albedo(point);
     light[k] = exposure_scale * albedo * irradiance * std::numbers::inv_pi_v<float> +

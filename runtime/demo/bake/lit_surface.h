@@ -17,6 +17,7 @@ namespace rebounce {
 struct LitPiece {
   SurfacePoint point;  ///< at its centre
   float width = 0;     ///< metres
+  Float3 added{};      ///< to the bounced light of its vertices, lx
 };
 
 /// Computes the light that leaves pieces of surface: direct light as a mean over points of them,

@@ -57,7 +57,8 @@ class TexelFrame {
 }  // namespace
 
 ScreenImage light_texture(const TransferData& data, const SurfaceLighter& lighter,
-                          std::span<const std::uint8_t> chosen, float exposure) {
+                          std::span<const Float3> added, std::span<const std::uint8_t> chosen,
+                          float exposure) {
   const Lightmap& map = data.lightmap;
   const auto texel_count = static_cast<std::uint32_t>(map.triangle.size());
   const auto count = static_cast<std::uint32_t>(lighter.samples_per_piece());
@@ -75,8 +76,8 @@ ScreenImage light_texture(const TransferData& data, const SurfaceLighter& lighte
       const TexelFrame frame(data, lighter.surface(), t);
       const auto piece = begin + static_cast<std::uint32_t>(pieces.size());
       texels.push_back(k);
-      pieces.push_back(
-          {lighter.surface().point_on(t, frame.moved(map.weight[k], {0, 0})), frame.width()});
+      pieces.push_back({lighter.surface().point_on(t, frame.moved(map.weight[k], {0, 0})),
+                        frame.width(), added.empty() ? Float3{} : added[k]});
       for (std::uint32_t s = 0; s < count; ++s) {
         const glm::vec2 offset =
             r2_point(s, glm::vec2(hash_to_unit(piece, 0), hash_to_unit(piece, 1))) - 0.5F;

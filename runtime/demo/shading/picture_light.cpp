@@ -62,6 +62,14 @@ VertexLight light_at_vertices(const TransferData& data, const PictureLight& ligh
   return at_vertices;
 }
 
+std::vector<Float3> added_at_texels(const TransferData& data, const PictureLight& light) {
+  check_length(light.reflected_exitance.size(), data.patches.size(), "reflected_exitance");
+  if (data.texel_rows.empty() || light.reflected_exitance.empty()) return {};
+  std::vector<Float3> added(data.lightmap.triangle.size(), Float3{0, 0, 0});
+  ReceiverProducts(data.texel_rows, data.patches.area).add(light.reflected_exitance, added);
+  return added;
+}
+
 std::vector<Float3> reflected_exitance(const Engine& engine) {
   std::vector<Float3> reflected(engine.radiosity().begin(), engine.radiosity().end());
   for (std::size_t i = 0; i < reflected.size(); ++i) {

@@ -19,8 +19,8 @@ struct PictureLight {
   /// F M_e in lx: the part of H that comes directly from emitters. The picture computes this part
   /// for every pixel, with sharp shadows, and takes only the rest of H from the patches.
   std::span<const Float3> emitted_irradiance{};
-  /// B - M_e in lx: what patches reflect. Rows of vertices add their part of it; without it they
-  /// are left out.
+  /// B - M_e in lx: what patches reflect. Rows of vertices and texels add their part of it; without
+  /// it they are left out.
   std::span<const Float3> reflected_exitance{};
   std::span<const float> error{};  ///< >= 0, drawn by Show::kError
 };
@@ -36,6 +36,10 @@ struct VertexLight {
 
 /// Throws Error if an array of `light` has neither no entries nor one for each patch.
 VertexLight light_at_vertices(const TransferData& data, const PictureLight& light);
+
+/// What rows of texels add to the bounced light there [texels], in lx; empty if there are none.
+/// Throws Error as light_at_vertices does.
+std::vector<Float3> added_at_texels(const TransferData& data, const PictureLight& light);
 
 /// Values at the vertices from values of the patches; zero where a vertex has no weights or
 /// `patch_value` is empty.

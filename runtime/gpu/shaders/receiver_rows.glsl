@@ -1,6 +1,6 @@
 #version 430
-// What rows of vertices add to the light there: a work group for each group of vertices, whose
-// entries are sets of patches.
+// What rows of receivers, vertices or texels, add to the light there: a work group for each group
+// of receivers, whose entries are sets of patches.
 layout(local_size_x = 64) in;
 
 layout(std140, binding = 8) uniform Stage {
@@ -10,9 +10,9 @@ layout(std140, binding = 8) uniform Stage {
 layout(std430, binding = 0) readonly buffer SetLight { vec4 set_light[]; };
 layout(std430, binding = 1) readonly buffer Begin { uint begin[]; };        // [groups + 1]
 layout(std430, binding = 2) readonly buffer Entries { uvec2 entries[]; };   // set, bits of scale
-layout(std430, binding = 3) readonly buffer Vertices { uint vertices[]; };  // [groups][64]
+layout(std430, binding = 3) readonly buffer Receivers { uint receivers[]; };  // [groups][64]
 layout(std430, binding = 4) readonly buffer Values { uvec4 values[]; };     // bytes, four entries
-layout(std430, binding = 5) writeonly buffer Added { float added[]; };      // [vertices][3]
+layout(std430, binding = 5) writeonly buffer Added { float added[]; };      // [receivers][3]
 
 shared vec3 coefficient[64];
 
@@ -38,7 +38,7 @@ void main() {
       }
     }
   }
-  uint vertex = vertices[group * 64u + thread];
-  if (vertex == 0xFFFFFFFFu) return;
-  for (uint c = 0u; c < 3u; ++c) added[3u * vertex + c] = sum[c];
+  uint receiver = receivers[group * 64u + thread];
+  if (receiver == 0xFFFFFFFFu) return;
+  for (uint c = 0u; c < 3u; ++c) added[3u * receiver + c] = sum[c];
 }

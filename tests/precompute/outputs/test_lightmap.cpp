@@ -8,6 +8,7 @@
 
 #include "precompute/build/transfer_build.h"
 #include "precompute/import/import_gltf.h"
+#include "rebounce/outputs.h"
 #include "runtime/frame/engine_parts.h"
 #include "runtime/outputs/texel_light.h"
 #include "runtime/outputs/vertex_light.h"
@@ -17,6 +18,8 @@
 #include "tests/support/brute_force.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/unwrapped_room.h"
+#include "tests/support/with_threads.h"
+#include "transfer/operator/receiver_products.h"
 
 namespace rebounce::test_lightmap {
 namespace {
@@ -47,7 +50,7 @@ PatchModel model_of(const test::GltfBuilder& scene) {
 std::vector<Float3> texels_of(const TransferData& data, std::span<const Float3> patch_value) {
   std::vector<Float3> vertex(data.mesh.position.size()), texel(data.lightmap.triangle.size());
   reconstruct_at_vertices(data.mesh, patch_value, vertex);
-  interpolate_at_texels(data.lightmap, data.mesh, vertex, texel);
+  light_at_texels(data.lightmap, data.mesh, vertex, texel);
   return texel;
 }
 
@@ -72,8 +75,8 @@ glm::dvec3 gather(const Engine& engine, const PatchPoint& point) {
   return test::irradiance_at(engine, origin, point.normal, 1024);
 }
 
-Engine lit_room() {
-  Engine engine(room());
+Engine lit(const std::shared_ptr<const TransferData>& data) {
+  Engine engine(data);
   Light lamp;
   lamp.position = {1.2F, 2.2F, 1.9F};
   lamp.intensity = 100;
@@ -81,8 +84,105 @@ Engine lit_room() {
   return engine;
 }
 
+/// Relative L2 error of texels against brute-force gathers at every `step`-th of their middles, and
+/// how many were compared.
+std::pair<double, int> error_of(const Engine& engine, std::span<const Float3> texel,
+                                std::size_t step) {
+  double difference = 0, total = 0;
+  int compared = 0;
+  for (std::size_t k = 0; k < texel.size(); k += step) {
+    if (!is_in_chart(engine.data().lightmap, k)) continue;
+    const double truth = gather(engine, place_of(engine.data(), k)).y;
+    if (truth == 0) continue;  // under the block
+    ++compared;
+    difference += (texel[k][1] - truth) * (texel[k][1] - truth);
+    total += truth * truth;
+  }
+  return {std::sqrt(difference / total), compared};
+}
+
+/// Of few patches, whose texels have rows.
+TransferData build_rows() {
+  const test::TemporaryFolder folder;
+  BuildSettings settings;
+  settings.subdivision.patch_count = 150;
+  settings.lightmap.size = 64;
+  settings.receiver_rows.at_texels = true;
+  BuildReport report;
+  return build_transfer_data(test::unwrapped_scene(test::unwrapped_room()).write_glb(folder),
+                             settings, report);
+}
+
+const std::shared_ptr<const TransferData>& room_with_rows() {
+  static const auto data = std::make_shared<const TransferData>(build_rows());
+  return data;
+}
+
+TEST(TexelRows, AreNearerToRaysThanInterpolation) {
+  ASSERT_GT(room_with_rows()->texel_rows.group_count(), 1U);
+  Engine engine = lit(room_with_rows());
+  std::vector<Float3> texel(room_with_rows()->lightmap.triangle.size());
+  lightmap_irradiance(engine, texel);
+  const auto [with_rows, compared] = error_of(engine, texel, 3);
+  const auto interpolated = texels_of(*room_with_rows(), engine.indirect_irradiance());
+  const double without = error_of(engine, interpolated, 3).first;
+  std::printf("%d texels: relative L2 error %.4f with rows, %.4f without\n", compared, with_rows,
+              without);
+  EXPECT_GT(compared, 300);
+  EXPECT_LT(with_rows, 0.03);
+  EXPECT_LT(with_rows, 0.5 * without);
+}
+
+TEST(TexelRows, LeaveEvenLightEven) {
+  const TransferData& data = *room_with_rows();
+  const std::vector<Float3> even(data.patches.size(), Float3{1, 1, 1});
+  std::vector<Float3> added(data.lightmap.triangle.size(), Float3{0, 0, 0});
+  ReceiverProducts(data.texel_rows, data.patches.area).add(even, added);
+  const std::vector<Float3> without = texels_of(data, even);
+  int count = 0;
+  for (std::size_t k = 0; k < added.size(); ++k) {
+    if (added[k][0] == 0) continue;
+    ++count;
+    EXPECT_NEAR(without[k][0] + added[k][0], 1, 1e-3) << k;
+  }
+  EXPECT_GT(count, 500);
+}
+
+// Under the block everything is dark, and filters would spread that.
+TEST(TexelRows, AreNotInsideOfBodies) {
+  const TransferData& data = *room_with_rows();
+  const Engine engine = lit(room_with_rows());
+  int count = 0;
+  for (std::size_t k = 0; k < data.texel_rows.receiver.size(); k += 5) {
+    const std::uint32_t texel = data.texel_rows.receiver[k];
+    if (texel == kNone || !is_in_chart(data.lightmap, texel)) continue;
+    ++count;
+    EXPECT_GT(gather(engine, place_of(data, texel)).y, 0) << texel;
+  }
+  EXPECT_GT(count, 100);
+}
+
+TEST(TexelRows, AreTheSameOnAnyNumberOfThreadsAndAllocateNothing) {
+  const TransferData again = test::with_threads(1, build_rows);
+  EXPECT_EQ(again.texel_rows.value, room_with_rows()->texel_rows.value);
+  EXPECT_EQ(again.texel_rows.receiver, room_with_rows()->texel_rows.receiver);
+  Engine engine = lit(room_with_rows());
+  std::vector<Float3> texel(room_with_rows()->lightmap.triangle.size());
+  EXPECT_EQ(test::count_allocations([&] { lightmap_irradiance(engine, texel); }), 0);
+}
+
+TEST(TexelRows, NeedALightmap) {
+  const test::TemporaryFolder folder;
+  const auto path = test::unwrapped_scene(test::unwrapped_room()).write_glb(folder);
+  BuildSettings settings;
+  settings.subdivision.patch_count = 30;
+  settings.receiver_rows.at_texels = true;
+  BuildReport report;
+  test::expect_error([&] { build_transfer_data(path, settings, report); }, "need a lightmap");
+}
+
 TEST(Lightmap, TexelsAreThatOfABruteForceGatherAtTheirMiddles) {
-  const Engine engine = lit_room();
+  const Engine engine = lit(room());
   const Lightmap& map = room()->lightmap;
   const std::vector<Float3> texel = texels_of(*room(), engine.indirect_irradiance());
   double difference = 0, total = 0;
@@ -139,7 +239,7 @@ glm::dvec3 sample(const Lightmap& map, std::span<const Float3> texel, const glm:
 }
 
 TEST(Lightmap, ChartsThatMeetAgreeAlongTheirSeam) {
-  const Engine engine = lit_room();
+  const Engine engine = lit(room());
   const Lightmap& map = room()->lightmap;
   const DisplayMesh& mesh = room()->mesh;
   const std::vector<Float3> texel = texels_of(*room(), engine.indirect_irradiance());
@@ -246,21 +346,20 @@ TEST(Lightmap, CoordinatesThatAreNotFiniteAreNone) {
 
 TEST(Lightmap, AFrameDoesNotAllocateAndThreadsDoNotMatter) {
   const TransferData& data = *room();
-  const Engine engine = lit_room();
+  const Engine engine = lit(room());
   std::vector<Float3> vertex(data.mesh.position.size()), one(data.lightmap.triangle.size());
   reconstruct_at_vertices(data.mesh, engine.indirect_irradiance(), vertex);
   std::vector<Float3> four(one.size());
   const int before = omp_get_max_threads();
   omp_set_num_threads(1);
-  EXPECT_EQ(test::count_allocations(
-                [&] { interpolate_at_texels(data.lightmap, data.mesh, vertex, one); }),
-            0);
+  EXPECT_EQ(
+      test::count_allocations([&] { light_at_texels(data.lightmap, data.mesh, vertex, one); }), 0);
   omp_set_num_threads(4);
-  interpolate_at_texels(data.lightmap, data.mesh, vertex, four);
+  light_at_texels(data.lightmap, data.mesh, vertex, four);
   omp_set_num_threads(before);
   EXPECT_EQ(one, four);
   test::expect_error(
-      [&] { interpolate_at_texels(data.lightmap, data.mesh, vertex, std::span(one).first(3)); },
+      [&] { light_at_texels(data.lightmap, data.mesh, vertex, std::span(one).first(3)); },
       "values at texels");
 }
 

@@ -122,7 +122,7 @@ TEST(ReceiverRows, AreTheSameOnAnyNumberOfThreads) {
   const TransferData more = test::with_threads(4, [] { return build(true); });
   EXPECT_EQ(again.receiver_rows.value, more.receiver_rows.value);
   EXPECT_EQ(again.receiver_rows.scale, more.receiver_rows.scale);
-  EXPECT_EQ(again.receiver_rows.vertex, more.receiver_rows.vertex);
+  EXPECT_EQ(again.receiver_rows.receiver, more.receiver_rows.receiver);
   EXPECT_EQ(again.receiver_rows.entry_set, more.receiver_rows.entry_set);
   EXPECT_EQ(again.receiver_rows.set, more.receiver_rows.set);
 }
@@ -147,7 +147,8 @@ TEST(ReceiverRows, RefuseWhatCannotBe) {
   const TransferData data = build(false);
   const RayTracer tracer = make_surface_tracer(data.mesh);
   const auto make = [&](const TransferData& from, const ReceiverRowSettings& settings) {
-    make_receiver_rows(from, from.mesh.triangle_patch, tracer, settings, 1);
+    const VertexReceivers vertices(from, from.mesh.triangle_patch);
+    make_receiver_rows(from, from.mesh.triangle_patch, vertices, tracer, settings, 1);
   };
   test::expect_error([&] { make(data, {.ray_count = 63}); }, "at least 64 rays");
   test::expect_error([&] { make(data, {.tolerance = -1}); }, "tolerance");

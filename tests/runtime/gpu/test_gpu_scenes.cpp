@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <span>
@@ -224,10 +225,10 @@ void expect_light_of_shadow_rays(const std::shared_ptr<const TransferData>& data
   }
 }
 
-/// What rows add at the vertices, by plain sums over what is stored.
-std::vector<Float3> exact_rows(const TransferData& data, std::span<const Float3> radiosity) {
-  const ReceiverRows& rows = data.receiver_rows;
-  std::vector<Float3> added(data.mesh.position.size());
+/// What rows add to `count` receivers, by plain sums over what is stored.
+std::vector<Float3> exact_rows(const TransferData& data, const ReceiverRows& rows,
+                               std::size_t count, std::span<const Float3> radiosity) {
+  std::vector<Float3> added(count);
   std::array<double, ReceiverRows::kGroup> sum;
   for (std::size_t g = 0; g < rows.group_count(); ++g) {
     for (int c = 0; c < kChannelCount; ++c) {
@@ -245,34 +246,52 @@ std::vector<Float3> exact_rows(const TransferData& data, std::span<const Float3>
         }
       }
       for (std::size_t i = 0; i < sum.size(); ++i) {
-        const std::uint32_t vertex = rows.vertex[g * sum.size() + i];
-        if (vertex != kNone) added[vertex][c] = static_cast<float>(sum[i]);
+        const std::uint32_t receiver = rows.receiver[g * sum.size() + i];
+        if (receiver != kNone) added[receiver][c] = static_cast<float>(sum[i]);
       }
     }
   }
   return added;
 }
 
-// The processor rounds what the rows are multiplied with, the card does not.
+/// Adds them, and expects that they make a difference.
+void add_rows(const TransferData& data, const ReceiverRows& rows, std::span<const Float3> radiosity,
+              std::vector<Float3>& light) {
+  const std::vector<Float3> without = light;
+  const std::vector<Float3> added = exact_rows(data, rows, light.size(), radiosity);
+  for (std::size_t k = 0; k < light.size(); ++k) {
+    for (int c = 0; c < kChannelCount; ++c) light[k][c] += added[k][c];
+  }
+  EXPECT_GT(test::largest_difference(without, light), 0.05);
+}
+
+// The processor rounds what the rows are multiplied with, the card does not. The rows of vertices
+// stand for those of texels too: there are as many texels.
 TEST(GpuReceiverRows, AreAddedAtVerticesAndTexels) {
   const test::GlContext context;
   if (!context.is_current()) GTEST_SKIP() << "there is no OpenGL 4.3 on this machine";
-  const auto data = scene("furnished_room", true);
-  ASSERT_GT(data->receiver_rows.group_count(), 1U);
+  const auto built = scene("furnished_room", true);
+  ASSERT_GT(built->receiver_rows.group_count(), 1U);
+  const auto data = std::make_shared<TransferData>(*built);
+  data->texel_rows = data->receiver_rows;
+  std::ranges::replace_if(
+      data->texel_rows.receiver,
+      [&](std::uint32_t k) {
+        return k >= data->lightmap.triangle.size() || data->lightmap.triangle[k] == kNone;
+      },
+      kNone);
   const Light lamp = lamp_in_the_middle(*data);
-  Engine engine(data);
+  Engine engine(std::shared_ptr<const TransferData>{data});
   engine.relight({&lamp, 1}, {});
   const FrameLight found = light_of_the_card(engine);
 
   std::vector<Float3> vertices(data->mesh.position.size()), texels(data->lightmap.triangle.size());
   reconstruct_at_vertices(data->mesh, found.indirect, vertices);
-  const std::vector<Float3> added = exact_rows(*data, found.radiosity), without = vertices;
-  for (std::size_t v = 0; v < vertices.size(); ++v) {
-    for (int c = 0; c < kChannelCount; ++c) vertices[v][c] += added[v][c];
-  }
-  EXPECT_GT(test::largest_difference(without, vertices), 0.05);
+  add_rows(*data, data->receiver_rows, found.radiosity, vertices);
   interpolate_at_texels(data->lightmap, data->mesh, vertices, texels);
+  add_rows(*data, data->texel_rows, found.radiosity, texels);
   clamp_light(vertices);
+  clamp_light(texels);
   EXPECT_LE(test::largest_difference(vertices, found.vertices), 1e-5);
   EXPECT_LE(test::largest_difference(texels, found.texels), 1e-5);
 

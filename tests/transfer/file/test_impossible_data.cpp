@@ -105,6 +105,26 @@ TEST(TransferFile, RefusesAnImpossibleMesh) {
   });
 }
 
+TEST(TransferFile, RefusesImpossibleRowsOfTexels) {
+  const auto rows = [](auto change) {
+    return [change](TransferData& data) {
+      data.lightmap = test::sample_lightmap(data);
+      data.texel_rows = test::sample_texel_rows();
+      change(data);
+    };
+  };
+  expect_refused({
+      {"texel_receiver.set: entry 1 is empty", rows([](auto& d) {
+         d.texel_rows.set[1] = {2, 2};
+       })},
+      {"texel_receiver.texel: entry 5 is 2, not below 2",
+       rows([](auto& d) { d.texel_rows.receiver[5] = 2; })},
+      {"texel_receiver.texel: entry 5 is 1, not a texel that shows a triangle",
+       rows([](auto& d) { d.texel_rows.receiver[5] = 1; })},
+      {"texel_receiver.texel: entry 5 is 0, not below 0", rows([](auto& d) { d.lightmap = {}; })},
+  });
+}
+
 TEST(TransferFile, RefusesImpossibleRowsOfReceivers) {
   const auto rows = [](auto change) {
     return [change](TransferData& data) {
@@ -127,10 +147,10 @@ TEST(TransferFile, RefusesImpossibleRowsOfReceivers) {
       {"receiver.scale: entry 0", rows([](auto& r) { r.scale[0] = kNan; })},
       {"receiver.scale: entry 1", rows([](auto& r) { r.scale[1] = -1; })},
       {"receiver.scale: 3 rows, not 4", rows([](auto& r) { r.scale.pop_back(); })},
-      {"receiver.vertex: 127 rows, not 128", rows([](auto& r) { r.vertex.pop_back(); })},
-      {"receiver.vertex: entry 0 is 4, not below 4", rows([](auto& r) { r.vertex[0] = 4; })},
+      {"receiver.vertex: 127 rows, not 128", rows([](auto& r) { r.receiver.pop_back(); })},
+      {"receiver.vertex: entry 0 is 4, not below 4", rows([](auto& r) { r.receiver[0] = 4; })},
       {"receiver.vertex: entry 127 is 3, not there for the first time",
-       rows([](auto& r) { r.vertex[127] = 3; })},
+       rows([](auto& r) { r.receiver[127] = 3; })},
       {"receiver.value", rows([](auto& r) { r.value.pop_back(); })},
       {"receiver.group_begin: does not begin", rows([](auto& r) { r.group_begin[0] = 4; })},
       {"receiver.group_begin: descends", rows([](auto& r) { r.group_begin[1] = 8; })},

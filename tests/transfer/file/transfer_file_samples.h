@@ -185,10 +185,18 @@ inline ReceiverRows sample_receiver_rows() {
   rows.group_begin = {0, 4, 4};
   rows.entry_set = {0, 1, 1, 0};
   rows.scale = {0.5F, 0.25F, 0, 1};
-  rows.vertex.assign(2 * std::size_t{ReceiverRows::kGroup}, kNone);
-  rows.vertex[1] = 3;
-  rows.vertex[64] = 0;
+  rows.receiver.assign(2 * std::size_t{ReceiverRows::kGroup}, kNone);
+  rows.receiver[1] = 3;
+  rows.receiver[64] = 0;
   for (int k = 0; k < 4 * 64; ++k) rows.value.push_back(static_cast<std::int8_t>(k - 128));
+  return rows;
+}
+
+/// Of the one texel of the sample that shows something.
+inline ReceiverRows sample_texel_rows() {
+  ReceiverRows rows = sample_receiver_rows();
+  rows.receiver.assign(rows.receiver.size(), kNone);
+  rows.receiver[5] = 0;
   return rows;
 }
 
@@ -201,6 +209,7 @@ inline TransferData full_sample_data(Precision precision = Precision::kF16) {
   data.lightmap = sample_lightmap(data);
   data.surface_harmonics = sample_surface_harmonics();
   data.receiver_rows = sample_receiver_rows();
+  data.texel_rows = sample_texel_rows();
   return data;
 }
 
@@ -317,12 +326,13 @@ inline void expect_equal(const Lightmap& a, const Lightmap& b) {
 
 inline void expect_equal(const ReceiverRows& a, const ReceiverRows& b) {
   expect_same(a, b, &ReceiverRows::patch, &ReceiverRows::set, &ReceiverRows::group_begin,
-              &ReceiverRows::entry_set, &ReceiverRows::scale, &ReceiverRows::vertex,
+              &ReceiverRows::entry_set, &ReceiverRows::scale, &ReceiverRows::receiver,
               &ReceiverRows::value);
 }
 
 inline void expect_equal(const TransferData& a, const TransferData& b) {
   expect_equal(a.receiver_rows, b.receiver_rows);
+  expect_equal(a.texel_rows, b.texel_rows);
   expect_equal(a.sky_cells, b.sky_cells);
   expect_equal(a.probes, b.probes);
   expect_equal(a.lightmap, b.lightmap);

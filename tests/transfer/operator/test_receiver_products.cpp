@@ -36,7 +36,7 @@ Sample make_sample(std::uint32_t seed) {
         {begin, begin + 1 + static_cast<std::uint32_t>(random() % (kPatches - begin))});
   }
   rows.group_begin = {0};
-  rows.vertex.resize(kGroups * kGroup, kNone);
+  rows.receiver.resize(kGroups * kGroup, kNone);
   std::vector<std::uint32_t> vertex(kGroups * kGroup);
   std::iota(vertex.begin(), vertex.end(), 0U);
   std::ranges::shuffle(vertex, random);
@@ -48,7 +48,7 @@ Sample make_sample(std::uint32_t seed) {
     }
     rows.group_begin.push_back(static_cast<std::uint32_t>(rows.entry_set.size()));
     for (std::uint32_t i = 0; i < kGroup; ++i) {
-      if (random() % 8 != 0) rows.vertex[g * kGroup + i] = vertex[g * kGroup + i];
+      if (random() % 8 != 0) rows.receiver[g * kGroup + i] = vertex[g * kGroup + i];
     }
   }
   for (std::size_t k = 0; k < rows.entry_set.size() * kGroup; ++k) {
@@ -83,7 +83,7 @@ std::vector<std::array<double, 3>> plain_sums(const Sample& sample) {
   for (std::size_t g = 0; g < rows.group_count(); ++g) {
     for (std::uint32_t e = rows.group_begin[g]; e < rows.group_begin[g + 1]; ++e) {
       for (std::uint32_t i = 0; i < kGroup; ++i) {
-        const std::uint32_t v = rows.vertex[g * kGroup + i];
+        const std::uint32_t v = rows.receiver[g * kGroup + i];
         if (v == kNone) continue;
         const std::size_t at = std::size_t{kGroup} * rows.group_begin[g] +
                                ReceiverRows::value_index(e - rows.group_begin[g], i);

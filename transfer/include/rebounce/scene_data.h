@@ -146,14 +146,15 @@ struct DisplayMesh {
   std::size_t surface_count() const { return back_triangle.size(); }
 };
 
-/// What vertices of the display mesh receive beyond their reconstruction weights: rows of their
-/// own, as the difference from those of their patches. A row is by sets of patches, each taken as
-/// if it shone evenly: set k has the patches at the positions [set[k][0], set[k][1]) of `patch`,
-/// and its light x is their radiosity in lx, averaged over their area.
+/// What receivers, vertices of the display mesh or texels of the lightmap, get beyond what the
+/// reconstruction weights give them: rows of their own, as the difference from those of their
+/// patches. A row is by sets of patches, each taken as if it shone evenly: set k has the patches at
+/// the positions [set[k][0], set[k][1]) of `patch`, and its light x is their radiosity in lx,
+/// averaged over their area.
 ///
-/// Vertices are in groups of kGroup. All of a group see the same sets; set j of group g is entry
-/// e = group_begin[g] + j. To vertex number i of the group it adds value x scale[e] x its light, in
-/// lx of irradiance.
+/// Receivers are in groups of kGroup. All of a group see the same sets; set j of group g is entry
+/// e = group_begin[g] + j. To receiver number i of the group it adds value x scale[e] x its light,
+/// in lx of irradiance.
 struct ReceiverRows {
   static constexpr std::uint32_t kGroup = 64;
   static constexpr std::uint32_t kSetStep = 4;      ///< the sets of a group are a multiple of this
@@ -164,16 +165,16 @@ struct ReceiverRows {
   std::vector<std::uint32_t> group_begin;         ///< [g + 1] of entries
   std::vector<std::uint32_t> entry_set;           ///< [q]
   std::vector<float> scale;                       ///< [q]
-  std::vector<std::uint32_t> vertex;              ///< [kGroup g] each vertex once at most, or kNone
-  /// [kGroup q] the value of vertex i in entry e is at value_index(e, i).
+  std::vector<std::uint32_t> receiver;            ///< [kGroup g] each once at most, or kNone
+  /// [kGroup q] the value of receiver i in entry e is at value_index(e, i).
   std::vector<std::int8_t> value;
 
   bool empty() const { return group_begin.empty(); }
   std::size_t group_count() const { return empty() ? 0 : group_begin.size() - 1; }
 
-  /// Entries by fours, within them vertices by fours, as integer bases are (operator_format.h).
-  static constexpr std::size_t value_index(std::size_t entry, std::size_t vertex_in_group) {
-    return entry / 4 * 4 * kGroup + vertex_in_group / 4 * 16 + entry % 4 * 4 + vertex_in_group % 4;
+  /// Entries by fours, within them receivers by fours, as integer bases are (operator_format.h).
+  static constexpr std::size_t value_index(std::size_t entry, std::size_t in_group) {
+    return entry / 4 * 4 * kGroup + in_group / 4 * 16 + entry % 4 * 4 + in_group % 4;
   }
 };
 
@@ -255,7 +256,8 @@ struct SurfaceHarmonics {
 /// One texture for the light of all display triangles that have a place in it, as a sparse linear
 /// map: the value of a texel is that of a place on the display mesh, interpolated between the
 /// vertices of its triangle, whose values are in turn a linear map of the patches'
-/// (DisplayMesh::weight). Texels around a chart continue it, for filters that reach over its rim.
+/// (DisplayMesh::weight), and what a row of its own adds (SceneData::texel_rows). Texels around a
+/// chart continue it, for filters that reach over its rim.
 struct Lightmap {
   std::uint32_t width = 0, height = 0;  ///< texels; zeros: there is no lightmap
   /// [v] of the display mesh, in [0, 1], (0, 0) the upper left corner of the texture; (0, 0) where
@@ -292,7 +294,8 @@ struct SceneData {
   LightProbes probes;                  ///< may be none
   Lightmap lightmap;                   ///< may be empty
   SurfaceHarmonics surface_harmonics;  ///< may be empty
-  ReceiverRows receiver_rows;          ///< may be empty
+  ReceiverRows receiver_rows;          ///< of vertices of the mesh; may be empty
+  ReceiverRows texel_rows;             ///< of texels of the lightmap; may be empty
   BuildRecord record;
 };
 
