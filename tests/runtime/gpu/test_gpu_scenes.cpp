@@ -141,7 +141,7 @@ struct FrameLight {
 
 /// What the card writes of the direct light of a frame.
 FrameLight light_of_the_card(const Engine& engine) {
-  const std::shared_ptr<const TransferData> data = engine.shared_data();
+  const std::shared_ptr<const TransferData>& data = engine.shared_data();
   GpuEngine gpu(data, eglGetProcAddress);
   gpu.set_sky(engine.sky());
   const test::FrameBuffers buffers(*data, engine.direct_irradiance());
