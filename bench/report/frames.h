@@ -30,10 +30,9 @@ struct FrameRow {
 
 /// Follows each path with every contestant at each of settings.budgets, every frame from the
 /// solution of the one before, or in the dark where that is better after a switch; that before the
-/// first frame is exact. How many sweeps fit is told by
-/// `times` and not by a clock, so that the errors are the same in every run that has the same
-/// times. The truth is the dense inverse, which gets `truth_error` for its own. Throws Cancelled if
-/// asked to stop.
+/// first frame is exact. How many sweeps fit is told by `times` and not by a clock, so that the
+/// errors are the same in every run that has the same times. The truth is the dense inverse, which
+/// gets `truth_error` for its own. Throws Cancelled if asked to stop.
 std::vector<FrameRow> measure_frames(const Contenders& contenders,
                                      const std::vector<Contestant>& contestants,
                                      const std::vector<RunTime>& times, double truth_error,

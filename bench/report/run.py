@@ -31,7 +31,7 @@ SIZES, QUICK_SIZES = (1000, 4000, 16000), (1000,)
 TINY = (("cornell_box", 100), ("cornell_box", 300))
 
 # Seconds that a measurement takes on two cores that do nothing else: those of any size, and those
-# of 1,000 patches, which grow with this exponent of their number (lab/125). What finished ones took
+# of 1,000 patches, which grow with this exponent of their number (lab/128). What finished ones took
 # scales them.
 ANY_SECONDS, SECONDS, QUICK_SECONDS, EXPONENT = 135, 26, 20, 1.3
 
