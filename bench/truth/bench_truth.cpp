@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "bench/reference/compare_receivers.h"
 #include "bench/reference/scene_key_light.h"
@@ -30,6 +31,8 @@ struct Options {
   std::string quality = "default";  ///< of the form factors
   std::vector<std::size_t> patch_counts{1000, 4000};
   bool key_light = false;
+  std::string own_lights;  ///< file
+  double lamp_weight = SubdivisionSettings{}.lamp_weight;
   ReceiverRowSettings rows;
   std::size_t point_count = 20000;
   std::uint32_t samples = 512;
@@ -60,6 +63,7 @@ class TruthBench {
         tracer_(reference::make_scene_tracer(scene_)),
         sides_(find_lit_sides(scene_, tracer_)) {
     choose_lights();
+    if (!options.own_lights.empty()) own_lights_ = read_lights(options.own_lights).lights;
     points_ = reference::sample_surface(scene_, sides_, options.point_count,
                                         options.patch_comparison.seed);
     truth_ =
@@ -136,7 +140,9 @@ class TruthBench {
     const reference::PipelineSettings settings{.patch_count = patch_count,
                                                .quality = quality_named(options_.quality),
                                                .direct_points = options_.direct_points,
-                                               .receiver_rows = options_.rows};
+                                               .receiver_rows = options_.rows,
+                                               .own_lights = own_lights_,
+                                               .lamp_weight = options_.lamp_weight};
     return reference::solve_scene(
         options_.scene, settings, setup_.lights, setup_.sky,
         [this](std::string_view phase, double part) { return bar_.update(phase, part); });
@@ -148,6 +154,7 @@ class TruthBench {
   RayTracer tracer_;
   std::vector<TriangleSides> sides_;
   LightSetup setup_;
+  std::optional<std::vector<Light>> own_lights_;
   std::vector<reference::SurfacePoint> points_;
   reference::IrradianceEstimate truth_;
 };
@@ -207,6 +214,11 @@ void add_options(CLI::App& app, Options& options) {
                                 "Lights: .json, or a .glb that has some; by default the scene's");
   app.add_flag("--key-light", options.key_light, "One point light at a place found for it")
       ->excludes(lights);
+  app.add_option("--own-lights", options.own_lights,
+                 "Lamps that the build takes for the scene's own; by default those of the asset");
+  app.add_option("--lamp-weight", options.lamp_weight,
+                 "How much finer patches are where the light of the scene's own lamps varies")
+      ->capture_default_str();
   app.add_option("--points", options.point_count, "Points at which the reconstruction is compared")
       ->check(CLI::Range(1, 100000000))
       ->capture_default_str();

@@ -43,6 +43,8 @@ Solution solve_scene(const std::string& scene, const PipelineSettings& settings,
                      std::span<const Light> lights, const Sky& sky, const BuildProgress& progress) {
   BuildSettings build;
   build.subdivision.patch_count = settings.patch_count;
+  build.subdivision.lamp_weight = settings.lamp_weight;
+  build.lights = settings.own_lights;
   build.receiver_rows = settings.receiver_rows;
   build.operator_kind =
       settings.receiver_rows.at_vertices ? OperatorKind::kHierarchical : OperatorKind::kNoOperator;

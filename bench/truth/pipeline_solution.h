@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -18,6 +19,9 @@ struct PipelineSettings {
   FormFactorQuality quality = FormFactorQuality::kDefault;
   int direct_points = 0;  ///< of a patch at which lamps are looked at
   ReceiverRowSettings receiver_rows{};
+  /// The lamps that the build takes for the scene's own; by default those of the asset.
+  std::optional<std::vector<Light>> own_lights{};
+  double lamp_weight = SubdivisionSettings{}.lamp_weight;
 };
 
 /// One number of patches: its form factors, and their light.

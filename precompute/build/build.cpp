@@ -17,6 +17,7 @@
 #include "precompute/patches/patch_selection.h"
 #include "precompute/patches/winding.h"
 #include "rebounce/version.h"
+#include "runtime/lights/light_sampling.h"
 #include "runtime/solvers/solve_radiosity.h"
 
 namespace rebounce {
@@ -59,11 +60,14 @@ class TransferBuild {
   Scene import_scene(const std::filesystem::path& path) {
     Scene scene =
         clock_.run("import", [&](const Progress&) { return import_usable(path, settings_.scale); });
-    describe_scene(scene);
     return scene;
   }
 
-  void describe_scene(const Scene& scene) {
+  void describe_scene(Scene& scene) {
+    if (settings_.lights) {
+      check_lights(*settings_.lights);
+      scene.lights = *settings_.lights;
+    }
     report_.triangle_count = scene.triangle.size();
     report_.degenerate_triangle_count = scene.degenerate_triangle_count;
     report_.mesh_names = mesh_names(scene);
@@ -142,6 +146,7 @@ class TransferBuild {
 
   /// All that follows on the scene.
   TransferData run(Scene scene) {
+    describe_scene(scene);
     make_patches(std::move(scene));
     find_exchange();
     make_operator();
@@ -202,7 +207,6 @@ TransferData build_transfer_data(Scene scene, const BuildSettings& settings, Bui
                                  const BuildProgress& progress,
                                  const EstimateListener& on_estimate) {
   TransferBuild build(settings, report, progress, on_estimate);
-  build.describe_scene(scene);
   return build.run(std::move(scene));
 }
 

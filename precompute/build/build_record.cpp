@@ -27,6 +27,7 @@ std::string settings_json(const BuildSettings& settings, double form_factor_tole
                       {"precision", precision_name(*settings.precision)},
                       {"patches", settings.subdivision.patch_count},
                       {"patch_size", settings.subdivision.patch_size},
+                      {"lamp_weight", settings.subdivision.lamp_weight},
                       {"seed", f.seed},
                       {"probe_rays", f.probe_rays},
                       {"full_rays", f.full_rays},

@@ -13,6 +13,7 @@
 #include "precompute/cli/mpi_ranks.h"
 #include "precompute/cli/output_check.h"
 #include "precompute/cli/web_file.h"
+#include "precompute/import/light_file.h"
 #include "precompute/lights/validation_error.h"
 #include "precompute/patches/patch_selection.h"
 #include "rebounce/error.h"
@@ -24,8 +25,8 @@ namespace rebounce::cli {
 namespace {
 
 struct PrecomputeOptions {
-  std::string scene, output, form_factors, precision, reader, quality = "default",
-                                                              receivers_at = "patches";
+  std::string scene, lights, output, form_factors, precision, reader;
+  std::string quality = "default", receivers_at = "patches";
   std::string operator_kind = "hierarchical";
   std::vector<std::string> receivers, sources;  ///< each a list
   BuildSettings settings;
@@ -172,6 +173,7 @@ BuildSettings settings_of(const PrecomputeOptions& chosen) {
   parse_probes(chosen.probes, settings.probes);
   settings.receivers = split_lists(chosen.receivers);
   settings.sources = split_lists(chosen.sources);
+  if (!chosen.lights.empty()) settings.lights = read_lights(chosen.lights).lights;
   if (chosen.form_factors == "pairs") settings.exchange_source = ExchangeSource::kPairs;
   if (chosen.form_factors == "links") settings.exchange_source = ExchangeSource::kLinks;
   settings.form_factors = with_quality(quality_named(chosen.quality), settings.form_factors);
@@ -250,6 +252,16 @@ void add_scene_options(CLI::App& command, PrecomputeOptions& chosen) {
       ->check(CLI::PositiveNumber)
       ->excludes(patches)
       ->each([&subdivision](const std::string&) { subdivision.patch_count = 0; });
+  command
+      .add_option("--lights", chosen.lights,
+                  "The scene's own lamps, in place of those of the asset: LIGHTS.json, or a .glb "
+                  "that has some. Patches are finer where their light varies");
+  command
+      .add_option("--lamp-weight", subdivision.lamp_weight,
+                  "How much finer patches are where the direct light of the scene's own lamps "
+                  "varies; 0: not at all")
+      ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str();
   command.add_option("--scale", chosen.settings.scale, "Metres in one unit of the scene file")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();

@@ -5,7 +5,9 @@
 #include <utility>
 
 #include "precompute/lights/random_lights.h"
+#include "runtime/frame/direct_lighting.h"
 #include "runtime/rays/sampling.h"
+#include "transfer/base/reflection.h"
 
 namespace rebounce {
 namespace {
@@ -17,6 +19,16 @@ constexpr int kValidationPointCount = 512;  // lab/047: fewer let more single li
 static_assert(kMostTrainingLights ==
               kTrainingPointCount + kTrainingSpotCount + kTrainingSunCount + 1);
 static_assert(kMostValidationLights == kValidationPointCount + 1);
+
+/// What patches send of the light of the scene's own lamps and emitters, [n] lx.
+std::vector<Float3> own_exitance(const TransferData& data, const RayTracer& tracer) {
+  const PatchTable& patches = data.patches;
+  if (data.lights.empty()) return patches.emitted_exitance;
+  std::vector<Float3> exitance(patches.size());
+  DirectLighting(data, tracer).compute(data.lights, {}, exitance);
+  add_reflected(patches.emitted_exitance, patches.reflectance, exitance, exitance);
+  return exitance;
+}
 
 }  // namespace
 
@@ -33,7 +45,7 @@ DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& trace
     std::ranges::move(draw(kind, count), std::back_inserter(lights.training));
   }
   // The lamps of the scene itself are certain to be used.
-  std::vector<Float3> own = data.patches.emitted_exitance;
+  std::vector<Float3> own = own_exitance(data, tracer);
   roles.keep(PatchRoles::kSource, own);
   lights.training.push_back(own);
   lights.validation.push_back(std::move(own));

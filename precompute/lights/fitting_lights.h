@@ -39,8 +39,9 @@ inline constexpr std::size_t kFittingLightBytes =
 
 /// Draws the lights that the operator of a scene is fitted to. Training lights are point lights,
 /// spot lights and, in an open scene, suns; validation lights are other point lights. Both contain
-/// the light of the scene's own lamps, which comes first among the validation lights. All are cut
-/// to what sources emit. The same `seed` gives the same lights.
+/// the light of the scene's own lamps and emitters together, last among the training lights and
+/// first among the validation lights. All are cut to what sources emit. The same `seed` gives the
+/// same lights.
 DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& tracer,
                                 std::uint64_t seed, const PatchRoles& roles = {});
 

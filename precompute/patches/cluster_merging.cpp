@@ -52,6 +52,7 @@ ElementCluster make_cluster(const Elements& elements, std::uint32_t e, double si
     cluster.sum[6 + k] = kReflectanceWeight * size * elements.reflectance[e][k];
   }
   cluster.sum[9] = kCoverWeight * size * elements.covered[e];
+  cluster.sum[10] = size * elements.lamp_light[e];
   for (double& s : cluster.sum) s *= cluster.area;
   cluster.low = elements.low(e);
   cluster.high = elements.high(e);

@@ -22,13 +22,13 @@ inline constexpr std::size_t kWitnessCount = 4;
 
 /// A set of elements.
 struct ElementCluster {
-  static constexpr std::size_t kFeatureCount = 10;
+  static constexpr std::size_t kFeatureCount = 11;
 
   double surface = 0;  ///< m²
   double area = 0;     ///< m², areas times density_weight, summed over the elements
   std::array<double, kFeatureCount>
-      sum{};                  ///< of area x feature: position, normal, reflectance, cover
-  glm::vec3 low{0}, high{0};  ///< box around the cluster, metres
+      sum{};  ///< of area x feature: position, normal, reflectance, cover, light of lamps
+  glm::vec3 low{0}, high{0};                           ///< box around the cluster, metres
   std::array<std::uint32_t, kWitnessCount> witness{};  ///< its largest elements
   std::uint8_t witness_count = 0;
   bool emits = false;

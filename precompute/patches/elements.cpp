@@ -12,6 +12,7 @@ void Elements::resize(std::size_t count) {
   reflectance.resize(count);
   emits.resize(count);
   covered.resize(count);
+  lamp_light.resize(count);
   density_weight.resize(count, 1.0F);
 }
 

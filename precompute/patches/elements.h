@@ -19,6 +19,7 @@ struct Elements {
   std::vector<Float3> reflectance;      ///< [e] [0, 1]
   std::vector<std::uint8_t> emits;      ///< [e] 1 if it emits
   std::vector<float> density_weight;    ///< [e] (0, 1] factor of its area
+  std::vector<float> lamp_light;        ///< [e] >= 0: LampLight::feature
   std::vector<float> covered;           ///< [e] fraction of its area that is covered closely
 
   std::size_t size() const { return area.size(); }

@@ -10,6 +10,7 @@
 #include "precompute/patches/covers.h"
 #include "precompute/patches/element_clusters.h"
 #include "precompute/patches/hemisphere_visibility.h"
+#include "precompute/patches/lamp_light.h"
 #include "precompute/patches/lit_sides.h"
 #include "precompute/patches/opacity_sampling.h"
 #include "precompute/patches/texture_sampling.h"
@@ -29,6 +30,9 @@ constexpr double kAfterContacts = 0.08, kAfterSides = 0.25, kAfterElements = 0.3
 // part.
 constexpr double kMostAtCovers = 4;
 
+// The same where the light of the scene's lamps varies.
+constexpr double kMostInLampLight = 8;
+
 // Covered surfaces count by this fraction less in the distribution of patches: they are dark, and
 // their light comes from nearby.
 constexpr double kLessCovered = 0.75;
@@ -38,10 +42,16 @@ constexpr double kLessCovered = 0.75;
 constexpr double kSmallElement = 1.0 / 16;
 constexpr std::uint32_t kCoverPoints = 8, kSightRays = 64;
 
+// Points of an element, and of a small one, at which the light of the scene's lamps is found.
+constexpr std::uint32_t kLampPoints = 8, kLampPointsOfSmall = 2;
+
 class PatchModelBuilder {
  public:
   PatchModelBuilder(Scene scene, const SubdivisionSettings& settings, const Progress& progress)
-      : scene_(std::move(scene)), settings_(settings), progress_(progress) {
+      : scene_(std::move(scene)),
+        settings_(settings),
+        progress_(progress),
+        lamp_light_(scene_, settings.lamp_weight) {
     drop_slivers();
     model_.scene_triangle_count = scene_.triangle.size();
     cut_at_contacts(scene_, settings);
@@ -97,6 +107,10 @@ class PatchModelBuilder {
     const double wanted = std::pow(scene_size / patch_size, 2);
     inherit_sides(refine_at_covers(scene_, sides_, tracer, patch_size,
                                    static_cast<std::size_t>(kMostAtCovers * wanted)));
+    if (lamp_light_.empty()) return;
+    lamp_light_.measure(scene_, sides_, tracer);
+    inherit_sides(lamp_light_.refine(scene_, sides_, tracer, patch_size,
+                                     static_cast<std::size_t>(kMostInLampLight * wanted)));
   }
 
   /// The density weight of each triangle: the larger one of its lit sides. Empty if patches have a
@@ -290,6 +304,8 @@ class PatchModelBuilder {
         elements_.density_weight[e] =
             static_cast<float>(seen * (1 - kLessCovered * elements_.covered[e]));
       }
+      elements_.lamp_light[e] = static_cast<float>(
+          lamp_light_.feature({p, q, r}, tracer, small ? kLampPointsOfSmall : kLampPoints));
       elements_.emits[e] =
           std::ranges::any_of(mean_exitance(t), [](float m) { return m > 0; }) ? 1 : 0;
     }
@@ -415,6 +431,7 @@ class PatchModelBuilder {
   std::vector<std::uint32_t> element_triangle_;  ///< display triangle of each element
   Elements elements_;
   double patch_area_ = 0;  ///< of the mean patch, m²
+  LampLight lamp_light_;
   PatchModel model_;
   std::size_t clamped_count_ = 0;
 };

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "rebounce/lights.h"
 #include "rebounce/operators.h"
 #include "rebounce/types.h"
 
@@ -20,6 +21,10 @@ struct SubdivisionSettings {
   std::size_t patch_count = 4096;
   /// The largest length of a patch, metres; 0: no limit.
   float patch_size = 0;
+  /// How much finer patches are where the direct light of the scene's own lamps and emitters
+  /// varies: a difference of its root mean square over the scene counts like this number of mean
+  /// patch sizes of distance. 0: light has no part in it.
+  double lamp_weight = 4;  // lab/130
 };
 
 struct FormFactorSettings {
@@ -122,6 +127,9 @@ inline constexpr std::size_t kPairsPatchCount = 20000;
 
 struct BuildSettings {
   double scale = 1;  ///< metres per unit of the scene file, > 0
+  /// The scene's own lamps, in place of those of the asset. Patches are finer where their light
+  /// varies, and the operator is fitted to it.
+  std::optional<std::vector<Light>> lights;
   SubdivisionSettings subdivision;
   FormFactorSettings form_factors;
   /// kPairs: link_epsilon is 0.

@@ -105,6 +105,7 @@ BuildSettings settings_of(const py::dict& options) {
     if (name == "patch_size") {
       settings.subdivision = {.patch_count = 0, .patch_size = value.cast<float>()};
     }
+    if (name == "lights") settings.lights = lights_from(value.cast<py::sequence>());
     if (name == "tolerance") settings.tolerance = value.cast<double>();
     if (name == "seed") settings.form_factors.seed = value.cast<std::uint64_t>();
     if (name == "operator") settings.operator_kind = operator_kind(value.cast<std::string>());

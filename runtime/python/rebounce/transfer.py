@@ -2,7 +2,7 @@
 
 import json
 import os
-from typing import Any, Dict, Optional, Tuple, Union
+from typing import Any, Dict, Optional, Sequence, Tuple, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,7 @@ from scipy.sparse.linalg import LinearOperator
 
 from . import _core
 from ._progress import Progress, log, reporting
+from .frame import Light
 from .scene import Scene
 
 Path = Union[str, "os.PathLike[str]"]
@@ -247,6 +248,7 @@ def precompute(
     form_factors: Optional[str] = None,
     *,
     patch_size: Optional[float] = None,
+    lights: Optional[Sequence[Light]] = None,
     quality: str = "default",
     operator: str = "hierarchical",
     links: bool = False,
@@ -257,6 +259,8 @@ def precompute(
 
     scene: a Scene, or the path of a .glb or .gltf file.
     patches: wanted number of patches, at least 1; patch_size: or their largest length, metres.
+    lights: the scene's own lamps, in place of those of the file. Patches are finer where their
+        light varies.
     tolerance: error of the indirect light that the operator may have in the mean, in [1e-5, 0.5].
     form_factors: None, "compressed" (to the tolerance) or "exact" (all pairs), for `solve` and
         TransferData.form_factors.
@@ -289,6 +293,8 @@ def precompute(
     }
     if patch_size is not None:
         options["patch_size"] = patch_size
+    if lights is not None:
+        options["lights"] = list(lights)
     with reporting(progress) as report:
         core, warnings = _core.build(scene._core, options, report)
     for warning in warnings:

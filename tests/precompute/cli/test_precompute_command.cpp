@@ -75,6 +75,29 @@ TEST_F(PrecomputeCommand, HoldsWhatARunNeedsAndFormFactorsOnRequest) {
   }
 }
 
+TEST_F(PrecomputeCommand, LampsOfAFileBecomeThoseOfTheScene) {
+  const std::string bare = precompute("bare.safetensors"),
+                    lit = precompute("lit.safetensors", {"--lights", kLights});
+  EXPECT_EQ(summary_of({"info", bare})["light_count"], 0);
+  const json info = summary_of({"info", lit});
+  EXPECT_EQ(info["light_count"], 1);
+  EXPECT_EQ(info["settings"]["lamp_weight"], SubdivisionSettings{}.lamp_weight);
+  // They shine where no other light is given, and a file of lights may give others.
+  const auto solve = [&](const std::string& file, const Words& lights) {
+    Words words{"solve", file, "-o", path("x.csv")};
+    words.insert(words.end(), lights.begin(), lights.end());
+    summary_of(words);
+    return test::read_bytes(path("x.csv"));
+  };
+  EXPECT_EQ(solve(lit, {}), solve(lit, {"--lights", kLights}));
+  EXPECT_NE(solve(lit, {}), solve(bare, {"--lights", kLights})) << "patches follow the lamps";
+  const auto refuse = [&](const std::string& lights, const std::string& words) {
+    expect_refused({"precompute", kScene, "--lights", lights, "-o", path("x.safetensors")}, words);
+  };
+  refuse(path("no.json"), "no.json");
+  refuse(kScene, "KHR_lights_punctual");
+}
+
 TEST_F(PrecomputeCommand, LinksHaveNoFormFactorsOfPairs) {
   expect_refused({"precompute", kScene, "--patches", "100", "--form-factors", "links",
                   "--store-form-factors", "-o", path("x.safetensors")},

@@ -63,6 +63,24 @@ def test_errors_are_one_line(tmp_path, small_room):
         bare.form_factors
 
 
+def test_patches_are_finer_in_the_light_of_the_lamps_of_the_scene():
+    vertices, faces = box(high=(4, 4, 4))
+    scene = rebounce.Scene(vertices, triangles_of(faces), reflectance=0.5)
+    lamp = rebounce.Light(position=(1, 0.5, 1), intensity=10)
+
+    def largest_below_lamp(lights):
+        data = rebounce.precompute(
+            scene, patches=300, lights=lights, quality="low", tolerance=0.05, progress=False
+        )
+        assert data.patch_count == pytest.approx(300, rel=0.03)
+        return data.area[np.linalg.norm(data.centroid - (1, 0, 1), axis=1) < 0.5].max()
+
+    assert 2 * largest_below_lamp([lamp]) < largest_below_lamp(None)
+    bad = rebounce.Light(position=(1, float("nan"), 1))
+    with pytest.raises(rebounce.Error, match="light 0"):
+        rebounce.precompute(scene, patches=100, lights=[bad], progress=False)
+
+
 def test_save_and_load(tmp_path, cornell):
     path = tmp_path / "box.safetensors"
     rebounce.save(path, cornell)
