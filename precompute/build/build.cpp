@@ -17,7 +17,6 @@
 #include "precompute/patches/patch_selection.h"
 #include "precompute/patches/winding.h"
 #include "rebounce/version.h"
-#include "runtime/lights/light_sampling.h"
 #include "runtime/solvers/solve_radiosity.h"
 
 namespace rebounce {
@@ -64,10 +63,7 @@ class TransferBuild {
   }
 
   void describe_scene(Scene& scene) {
-    if (settings_.lights) {
-      check_lights(*settings_.lights);
-      scene.lights = *settings_.lights;
-    }
+    if (settings_.lights) scene.lights = own_lights(settings_);
     report_.triangle_count = scene.triangle.size();
     report_.degenerate_triangle_count = scene.degenerate_triangle_count;
     report_.mesh_names = mesh_names(scene);

@@ -6,6 +6,7 @@
 #include "precompute/exchange/links/links.h"
 #include "precompute/inverse/dense_transfer.h"
 #include "rebounce/error.h"
+#include "runtime/lights/light_sampling.h"
 
 namespace rebounce {
 namespace {
@@ -70,6 +71,11 @@ BuildSettings decide(BuildSettings settings, const PatchModel& model) {
     settings.form_factor_tolerance = settings.tolerance / kToleranceOverFormFactors;
   }
   return settings;
+}
+
+const std::vector<Light>& own_lights(const BuildSettings& settings) {
+  check_lights(*settings.lights);
+  return *settings.lights;
 }
 
 }  // namespace rebounce

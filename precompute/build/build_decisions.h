@@ -9,4 +9,7 @@ namespace rebounce {
 /// contradict each other.
 BuildSettings decide(BuildSettings settings, const PatchModel& model);
 
+/// BuildSettings::lights, which must be there. Throws Error if one is out of range.
+const std::vector<Light>& own_lights(const BuildSettings& settings);
+
 }  // namespace rebounce

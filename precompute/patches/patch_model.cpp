@@ -6,12 +6,10 @@
 #include <numbers>
 #include <numeric>
 
-#include "precompute/patches/contact_cuts.h"
 #include "precompute/patches/covers.h"
+#include "precompute/patches/cut_surface.h"
 #include "precompute/patches/element_clusters.h"
 #include "precompute/patches/hemisphere_visibility.h"
-#include "precompute/patches/lamp_light.h"
-#include "precompute/patches/lit_sides.h"
 #include "precompute/patches/opacity_sampling.h"
 #include "precompute/patches/texture_sampling.h"
 #include "precompute/patches/vertex_split.h"
@@ -23,50 +21,29 @@ namespace rebounce {
 namespace {
 
 // The progress after each step. Measured on scenes of about 300,000 triangles.
-constexpr double kAfterContacts = 0.08, kAfterSides = 0.25, kAfterElements = 0.33,
-                 kAfterClusters = 0.92;
-
-// The largest number of triangles, per wanted patch, that are added where others are covered in
-// part.
-constexpr double kMostAtCovers = 4;
-
-// The same where the light of the scene's lamps varies.
-constexpr double kMostInLampLight = 8;
+constexpr double kAfterCuts = 0.25, kAfterElements = 0.33, kAfterClusters = 0.92;
 
 // Covered surfaces count by this fraction less in the distribution of patches: they are dark, and
 // their light comes from nearby.
 constexpr double kLessCovered = 0.75;
 
-// An element above this fraction of a mean patch gets this number of points for covers and rays for
-// its visibility. A smaller one gets one point, and counts as seeing much.
-constexpr double kSmallElement = 1.0 / 16;
-constexpr std::uint32_t kCoverPoints = 8, kSightRays = 64;
+// Points of an element above kSmallElement at which covers are searched; others get one.
+constexpr std::uint32_t kCoverPoints = 8;
 
 // Points of an element, and of a small one, at which the light of the scene's lamps is found.
 constexpr std::uint32_t kLampPoints = 8, kLampPointsOfSmall = 2;
 
 class PatchModelBuilder {
  public:
-  PatchModelBuilder(Scene scene, const SubdivisionSettings& settings, const Progress& progress)
-      : scene_(std::move(scene)),
+  PatchModelBuilder(CutSurface surface, const SubdivisionSettings& settings,
+                    const Progress& progress)
+      : scene_(std::move(surface.scene)),
         settings_(settings),
         progress_(progress),
-        lamp_light_(scene_, settings.lamp_weight) {
-    drop_slivers();
-    model_.scene_triangle_count = scene_.triangle.size();
-    cut_at_contacts(scene_, settings);
-    drop_thin(0);
-    report_progress(progress_, kAfterContacts);
-    const OpacityMaps opacity = find_opacity_maps(scene_);
-    const RayTracer tracer(scene_.position, scene_.triangle, opacity);
-    sides_ = find_lit_sides(scene_, tracer, part_of(progress_, kAfterContacts, kAfterSides));
-    for (std::uint32_t t = 0; t < sides_.size(); ++t) {
-      if (opacity.stopping_part(t) == 0) sides_[t] = {SideKind::kOpening, SideKind::kOpening};
-    }
-    const double scene_size = mean_patch_size(scene_, patches_per_triangle(), 1);
-    inherit_sides(subdivide(scene_, patches_per_triangle(), settings, density_weights(tracer)));
-    refine(tracer, scene_size);
-    drop_thin(0);  // cuts leave triangles without area at the precision of floats
+        sides_(std::move(surface.sides)),
+        lamp_light_(std::move(surface.lamp_light)) {
+    model_.sliver_count = surface.sliver_count;
+    model_.scene_triangle_count = surface.original_triangle_count;
   }
 
   PatchModel build() {
@@ -87,64 +64,6 @@ class PatchModelBuilder {
   }
 
  private:
-  std::vector<std::uint8_t> patches_per_triangle() const {
-    std::vector<std::uint8_t> count;
-    count.reserve(sides_.size());
-    for (const TriangleSides& s : sides_) {
-      count.push_back(static_cast<std::uint8_t>(s.patch_count()));
-    }
-    return count;
-  }
-
-  /// Makes triangles that are covered in part small relative to patches; `scene_size` is the square
-  /// root of the area of all lit sides, metres.
-  void refine(const RayTracer& tracer, double scene_size) {
-    const double patch_size =
-        settings_.patch_count > 0
-            ? scene_size / std::sqrt(static_cast<double>(settings_.patch_count))
-            : settings_.patch_size / kLongestEdge;
-    if (!(patch_size > 0)) return;
-    const double wanted = std::pow(scene_size / patch_size, 2);
-    inherit_sides(refine_at_covers(scene_, sides_, tracer, patch_size,
-                                   static_cast<std::size_t>(kMostAtCovers * wanted)));
-    if (lamp_light_.empty()) return;
-    lamp_light_.measure(scene_, sides_, tracer);
-    inherit_sides(lamp_light_.refine(scene_, sides_, tracer, patch_size,
-                                     static_cast<std::size_t>(kMostInLampLight * wanted)));
-  }
-
-  /// The density weight of each triangle: the larger one of its lit sides. Empty if patches have a
-  /// given size.
-  std::vector<float> density_weights(const RayTracer& tracer) const {
-    if (settings_.patch_size > 0) return {};
-    const double mean_area =
-        std::pow(mean_patch_size(scene_, patches_per_triangle(), settings_.patch_count), 2);
-    std::vector<float> result(sides_.size(), 1.0F);
-#pragma omp parallel for schedule(dynamic, 256)
-    for (std::uint32_t t = 0; t < sides_.size(); ++t) {
-      const auto [p, q, r] = corners_of(scene_, t);
-      const TriangleCorners front{p, q, r}, back{p, r, q};
-      if (rebounce::area_of(front) <= kSmallElement * mean_area) continue;
-      const auto of = [&](const TriangleCorners& side) {
-        return static_cast<float>(
-            density_weight(hemisphere_visibility(side, tracer, kSightRays, t)));
-      };
-      float most = 0;
-      if (sides_[t].front == SideKind::kLit) most = of(front);
-      if (sides_[t].back == SideKind::kLit && most < 1) most = std::max(most, of(back));
-      if (most > 0) result[t] = most;
-    }
-    return result;
-  }
-
-  /// Gives the parts of triangles their sides; `source` [t] is the triangle that each was part of.
-  void inherit_sides(const std::vector<std::uint32_t>& source) {
-    std::vector<TriangleSides> sides;
-    sides.reserve(source.size());
-    for (const std::uint32_t t : source) sides.push_back(sides_[t]);
-    sides_ = std::move(sides);
-  }
-
   bool is_double_sided(std::uint32_t t) const {
     return scene_.materials[model_.mesh.triangle_material[t]].double_sided;
   }
@@ -365,38 +284,6 @@ class PatchModelBuilder {
     return reflectance;
   }
 
-  /// Removes triangles whose height is below the precision of rays: what stands on them or sees
-  /// them cannot be determined.
-  void drop_slivers() {
-    model_.sliver_count = drop_thin(ray_offset_distance(scene_.position));
-    if (scene_.triangle.empty())
-      throw Error("scene " + scene_.name + " has no triangles but slivers; check --scale");
-  }
-
-  /// Removes triangles no higher than `thinnest` metres, and their sides if these are known.
-  /// Returns their number.
-  std::size_t drop_thin(double thinnest) {
-    std::size_t kept = 0;
-    for (std::size_t t = 0; t < scene_.triangle.size(); ++t) {
-      const auto [a, b, c] = scene_.triangle[t];
-      const glm::dvec3 p = to_dvec3(scene_.position[a]), q = to_dvec3(scene_.position[b]),
-                       r = to_dvec3(scene_.position[c]);
-      const double longest =
-          std::max({glm::distance(p, q), glm::distance(q, r), glm::distance(r, p)});
-      if (glm::length(glm::cross(q - p, r - p)) <= thinnest * longest) continue;
-      scene_.triangle[kept] = scene_.triangle[t];
-      if (!scene_.triangle_mesh.empty()) scene_.triangle_mesh[kept] = scene_.triangle_mesh[t];
-      if (!sides_.empty()) sides_[kept] = sides_[t];
-      scene_.triangle_material[kept++] = scene_.triangle_material[t];
-    }
-    const std::size_t dropped = scene_.triangle.size() - kept;
-    scene_.triangle.resize(kept);
-    scene_.triangle_material.resize(kept);
-    if (!scene_.triangle_mesh.empty()) scene_.triangle_mesh.resize(kept);
-    if (!sides_.empty()) sides_.resize(kept);
-    return dropped;
-  }
-
   /// Covered sides show the light of the surface that covers them at their middle.
   void find_shown_patches(const RayTracer& tracer) {
     const DisplayMesh& mesh = model_.mesh;
@@ -425,13 +312,13 @@ class PatchModelBuilder {
   Scene scene_;
   const SubdivisionSettings& settings_;
   const Progress& progress_;
-  std::vector<TriangleSides> sides_;             ///< of each triangle of the subdivided scene
+  std::vector<TriangleSides> sides_;  ///< of each triangle of the cut scene
+  LampLight lamp_light_;
   std::vector<SideKind> kind_;                   ///< of each display triangle
   std::vector<std::uint32_t> surface_of_;        ///< surface triangle of each display triangle
   std::vector<std::uint32_t> element_triangle_;  ///< display triangle of each element
   Elements elements_;
   double patch_area_ = 0;  ///< of the mean patch, m²
-  LampLight lamp_light_;
   PatchModel model_;
   std::size_t clamped_count_ = 0;
 };
@@ -441,7 +328,8 @@ class PatchModelBuilder {
 PatchModel make_patch_model(Scene scene, const SubdivisionSettings& settings,
                             const Progress& progress) {
   if (scene.triangle.empty()) throw Error("scene " + scene.name + " has no triangles");
-  return PatchModelBuilder(std::move(scene), settings, progress).build();
+  CutSurface surface = cut_surface(std::move(scene), settings, part_of(progress, 0, kAfterCuts));
+  return PatchModelBuilder(std::move(surface), settings, progress).build();
 }
 
 }  // namespace rebounce

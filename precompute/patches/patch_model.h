@@ -23,7 +23,6 @@ struct PatchModel {
   /// covers it; kNone for a side that sees nothing.
   std::vector<std::uint32_t> shown_patch;
   std::vector<std::uint32_t> triangle_mesh;  ///< [t] in Scene::placed_meshes, or empty
-  /// [v] of the mesh, or empty: see Scene. Second sides have no place in the lightmap unless the
   /// [v] of the mesh, or empty: see Scene. Both sides of a double-sided triangle have the same.
   std::vector<LightmapTexcoord> lightmap_texcoord;
   std::vector<std::string> lightmap_page;
