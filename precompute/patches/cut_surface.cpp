@@ -45,6 +45,7 @@ class SurfaceCutter {
     }
     const double scene_size = mean_patch_size(scene_, patches_per_triangle(), 1);
     inherit_sides(subdivide(scene_, patches_per_triangle(), settings_, density_weights(tracer)));
+    if (!lamp_light_.empty()) lamp_light_.measure(scene_, sides_, tracer);
     refine(tracer, scene_size);
     drop_thin(0);  // cuts leave triangles without area at the precision of floats
     return {std::move(scene_), std::move(sides_), std::move(lamp_light_), sliver_count,
@@ -73,7 +74,6 @@ class SurfaceCutter {
     inherit_sides(refine_at_covers(scene_, sides_, tracer, patch_size,
                                    static_cast<std::size_t>(kMostAtCovers * wanted)));
     if (lamp_light_.empty()) return;
-    lamp_light_.measure(scene_, sides_, tracer);
     inherit_sides(lamp_light_.refine(scene_, sides_, tracer, patch_size,
                                      static_cast<std::size_t>(kMostInLampLight * wanted)));
   }

@@ -25,12 +25,14 @@ constexpr int kEmissionSamples = 16;  // of each emitting triangle
 // Triangles whose longest edge is at most this number of patch sizes are fine enough.
 constexpr double kFinestInLight = 0.25;
 
-// A triangle is fine enough if its deviation, area times variance of the feature, is at most this
-// part of a mean patch's area times its size squared. Distances alone make it 1/6 in a square
-// patch.
+// A triangle is fine enough if area times variance of the feature is at most this part of a mean
+// patch's area. Distances alone make 1/6 of it in a square patch.
 constexpr double kDeviation = 0.05;
 
-/// A front of a triangle: its point `k` of `count`.
+// A lamp may lie in a surface: features are at most this number of mean patch sizes.
+constexpr double kLargestFeature = 1e4;
+
+/// Point `k` of `count` of the front of a triangle.
 glm::dvec3 point_of(const TriangleCorners& front, std::uint32_t k, std::uint32_t count) {
   if (count == 1) return (front[0] + front[1] + front[2]) / 3.0;
   return point_at(front, square_to_triangle(r2_point(k, glm::dvec2(0))));
@@ -40,9 +42,9 @@ glm::dvec3 point_of(const TriangleCorners& front, std::uint32_t k, std::uint32_t
 double mean_luminance(const Scene& scene, std::uint32_t t) {
   const Material& material = scene.materials[scene.triangle_material[t]];
   if (material.emitted_luminance == Float3{0, 0, 0}) return 0;
-  const auto [a, b, c] = scene.triangle[t];
+  const Uint3& v = scene.triangle[t];
   const auto of_corners = [&](const std::vector<Float2>& texcoord) {
-    return std::array{texcoord[a], texcoord[b], texcoord[c]};
+    return std::array{texcoord[v[0]], texcoord[v[1]], texcoord[v[2]]};
   };
   const auto [red, green, blue] =
       mean_emitted_luminance(scene, material, of_corners(scene.emissive_texcoord),
@@ -109,7 +111,7 @@ void LampLight::measure(const Scene& scene, std::span<const TriangleSides> sides
     whole += area[t];
     sum += square[t];
   }
-  if (sum > 0) {
+  if (sum > 0 && std::isfinite(sum)) {
     scale_ /= std::sqrt(sum / whole);
   } else {
     lights_.clear();
@@ -130,7 +132,8 @@ std::vector<std::uint32_t> LampLight::refine(Scene& scene, std::span<const Trian
 
 double LampLight::feature(const TriangleCorners& front, const RayTracer& tracer,
                           std::uint32_t count) const {
-  return empty() ? 0 : scale_ * light_on(front, tracer, count).mean;
+  if (empty()) return 0;
+  return std::min(scale_ * light_on(front, tracer, count).mean, kLargestFeature);
 }
 
 /// Of the feature, on the side on which it varies more.

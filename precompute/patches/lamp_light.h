@@ -28,7 +28,8 @@ class LampLight {
   bool empty() const { return lights_.empty() && emitters_.empty(); }
 
   /// Finds the root mean square of the light over the lit sides of `scene`, which is the unit of
-  /// all that follows. If no light arrives, the object is empty afterwards.
+  /// all that follows. If no light arrives, or more than numbers hold, the object is
+  /// empty afterwards.
   void measure(const Scene& scene, std::span<const TriangleSides> sides, const RayTracer& tracer);
 
   /// Bisects triangles on which the light varies until they add little to the deviation from the

@@ -147,6 +147,20 @@ TEST(LampLight, WithoutLightPatchesAreAsWithoutLamps) {
   EXPECT_NE(mesh_of(patches_of(scene, 4)), expected);
 }
 
+TEST(LampLight, LampsInSurfacesAndTooBrightOnesDoNoHarm) {
+  Scene scene = lit_room();
+  scene.lights = {lamp_at({2, 0, 2.5F}), lamp_at({0, 0, 0}), lamp_at({1.5F, 0.5F, 1.75F})};
+  for (const float intensity : {1e-30F, 1.0F, 3e38F}) {
+    for (Light& lamp : scene.lights) lamp.intensity = intensity;
+    const PatchModel model = patches_of(scene, 4);
+    EXPECT_NEAR(static_cast<double>(model.patches.size()), kPatches, 0.02 * kPatches);
+    for (std::size_t i = 0; i < model.patches.size(); ++i) {
+      ASSERT_GT(model.patches.area[i], 0) << intensity;
+      ASSERT_TRUE(std::isfinite(model.patches.centroid[i][0])) << intensity;
+    }
+  }
+}
+
 TEST(LampLight, IntensityAndNumberOfThreadsChangeNothing) {
   Scene scene = lit_room();
   const auto make = [&] { return mesh_of(patches_of(scene, 4)); };
