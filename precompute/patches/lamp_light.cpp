@@ -23,11 +23,11 @@ constexpr std::uint32_t kEmitterPoints = 32;
 constexpr int kEmissionSamples = 16;  // of each emitting triangle
 
 // Triangles whose longest edge is at most this number of patch sizes are fine enough.
-constexpr double kFinestInLight = 0.25;
+constexpr double kFinestInLight = 0.15;
 
 // A triangle is fine enough if area times variance of the feature is at most this part of a mean
-// patch's area. Distances alone make 1/6 of it in a square patch.
-constexpr double kDeviation = 0.05;
+// patch's area. Distances alone make 1/6 of it in a square patch (lab/130).
+constexpr double kDeviation = 0.02;
 
 // A lamp may lie in a surface: features are at most this number of mean patch sizes.
 constexpr double kLargestFeature = 1e4;
