@@ -104,6 +104,16 @@ class ViewCommand : public CommandLine {
     return read_image(path(name));
   }
 
+  /// A furnished room of few patches.
+  std::string furnished_room() {
+    std::string room = path("room.safetensors");
+    EXPECT_EQ(run({"precompute", kScenes + "furnished_room.gltf", "--patches", "300", "--quality",
+                   "low", "--tolerance", "0.05", "--quiet", "-o", room})
+                  .exit_code,
+              kDone);
+    return room;
+  }
+
   std::string file_;
 };
 
@@ -234,11 +244,7 @@ TEST_F(ViewCommand, ASkyByCellsLooksAsRenderDrawsIt) {
 }
 
 TEST_F(ViewCommand, NoSunShinesThroughTheSeamsOfAClosedRoom) {
-  const std::string room = path("room.safetensors");
-  ASSERT_EQ(run({"precompute", kScenes + "furnished_room.gltf", "--patches", "300", "--quality",
-                 "low", "--tolerance", "0.05", "--quiet", "-o", room})
-                .exit_code,
-            kDone);
+  const std::string room = furnished_room();
   const std::string sun = write("sun.lights.json", R"({"lights": [
       {"type": "directional", "direction": [-0.6, -0.6, -0.9], "intensity": 20000}]})");
   const Outcome outcome = run({"view", room, "--lights", sun, "--exposure", "-9", "--quiet",
@@ -248,6 +254,31 @@ TEST_F(ViewCommand, NoSunShinesThroughTheSeamsOfAClosedRoom) {
   ASSERT_EQ(dark.width, 1280);
   // A thousand of its pixels are on seams; at a low angle single ones are still found lit.
   EXPECT_LE(std::ranges::count_if(dark.rgb, [](int value) { return value > 40; }), 3 * 40);
+}
+
+TEST_F(ViewCommand, ACeilingIsSmoothAroundALampBelowIt) {
+  const std::string lamp = write("lamp.lights.json", R"({"lights": [
+      {"type": "point", "position": [1.5, 2.2, 1.5], "intensity": 60}]})");
+  const Outcome outcome = run({"view", furnished_room(), "--lights", lamp, "--exposure", "-5",
+                               "--show", "direct", "--quiet", "--screenshot", path("ceiling.png")});
+  EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+  const Image image = read_image(path("ceiling.png"));
+  ASSERT_EQ(image.width, 1280);
+  const auto green = [&](int x, int y) { return image.rgb[3 * (1280 * y + x) + 1]; };
+  constexpr int kReach = 2;
+  int dashes = 0;
+  for (int y = kReach; y < 95; ++y) {
+    for (int x = 300; x < 760; ++x) {
+      std::vector<int> around;
+      for (int v = y - kReach; v <= y + kReach; ++v) {
+        for (int u = x - kReach; u <= x + kReach; ++u) around.push_back(green(u, v));
+      }
+      const auto middle = around.begin() + around.size() / 2;
+      std::ranges::nth_element(around, middle);
+      dashes += *middle - green(x, y) > 8 ? 1 : 0;
+    }
+  }
+  EXPECT_LE(dashes, 20) << "edges of triangles shade themselves";
 }
 
 TEST_F(ViewCommand, WhatIsMaskedAwayIsNotDrawn) {

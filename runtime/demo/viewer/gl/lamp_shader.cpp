@@ -180,9 +180,12 @@ float range_window(float distance_squared) {
 
 void main() {
   vec4 base = texture(base_color_texture, base_uv);
-  vec3 to_lamp = shadow_map == 1 ? -lamp_direction : lamp_position - covered_position;
-  vec3 direction = to_lamp * inversesqrt(max(dot(to_lamp, to_lamp), 1e-12));
   vec3 geometric_normal = normalize(cross(dFdx(world_position), dFdy(world_position)));
+  // A driver may find centroids so roughly that they leave the plane of their triangle (lab/131).
+  vec3 place = covered_position -
+               geometric_normal * dot(covered_position - world_position, geometric_normal);
+  vec3 to_lamp = shadow_map == 1 ? -lamp_direction : lamp_position - place;
+  vec3 direction = to_lamp * inversesqrt(max(dot(to_lamp, to_lamp), 1e-12));
   if (dot(geometric_normal, eye - world_position) < 0) geometric_normal = -geometric_normal;
   vec3 normal = normalize(shading_normal);
   bool from_below = shadow_map != 2 && dot(geometric_normal, direction) <= 0;
@@ -190,9 +193,9 @@ void main() {
   strength *= range_window(dot(to_lamp, to_lamp));
   if (strength <= 0 || base_alpha * base.a < alpha_cutoff) discard;
   if (shadow_map == 1) {
-    strength *= plane_visibility(covered_position, geometric_normal);
+    strength *= plane_visibility(place, geometric_normal);
   } else if (shadow_map == 2) {
-    strength *= surface_visibility(covered_position, normal, geometric_normal);
+    strength *= surface_visibility(place, normal, geometric_normal);
   } else {
     strength *= cube_visibility(lifted_way(-to_lamp, geometric_normal));
   }
