@@ -6,7 +6,7 @@
 #include "precompute/exchange/links/links.h"
 #include "precompute/inverse/dense_transfer.h"
 #include "rebounce/error.h"
-#include "runtime/lights/light_sampling.h"
+#include "runtime/frame/engine_parts.h"
 
 namespace rebounce {
 namespace {

@@ -20,6 +20,16 @@ std::shared_ptr<const TransferData> checked(std::shared_ptr<const TransferData> 
 
 }  // namespace
 
+void check_lights(std::span<const Light> lights) {
+  for (std::size_t k = 0; k < lights.size(); ++k) {
+    try {
+      check_light(lights[k]);
+    } catch (const Error& error) {
+      throw Error("light " + std::to_string(k) + ": " + error.what());
+    }
+  }
+}
+
 OneThread::OneThread(EngineUse& use) : use_(use) {
   if (!use_.busy.exchange(true, std::memory_order_acquire)) return;
   throw Error("two threads use one engine at the same time; give each a copy of it");

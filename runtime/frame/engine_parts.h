@@ -38,6 +38,9 @@ class OneThread {
   EngineUse& use_;
 };
 
+/// Throws Error with the number of the first light that has a field out of its range.
+void check_lights(std::span<const Light> lights);
+
 struct Engine::Parts {
   Parts(std::shared_ptr<const TransferData> transfer_data, const EngineSettings& settings);
   Parts(const Parts& other);

@@ -1,9 +1,7 @@
 #include "runtime/lights/light_sampling.h"
 
 #include <algorithm>
-#include <string>
 
-#include "rebounce/error.h"
 #include "runtime/lights/lamp_kind.h"
 #include "runtime/rays/float3_glm.h"
 
@@ -36,16 +34,6 @@ void check_light(const Light& light) {
   if (!light.profile || !kind.uses(kProfile)) return;
   check_field(light, kDirection);
   check_field(light, kTangent);
-}
-
-void check_lights(std::span<const Light> lights) {
-  for (std::size_t k = 0; k < lights.size(); ++k) {
-    try {
-      check_light(lights[k]);
-    } catch (const Error& error) {
-      throw Error("light " + std::to_string(k) + ": " + error.what());
-    }
-  }
 }
 
 }  // namespace rebounce

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <span>
-
 #include "rebounce/lights.h"
 
 namespace rebounce {
@@ -35,8 +33,5 @@ IncidentLight evaluate_light(const Light& light, const Float3& point,
 /// Checks the fields that the type of `light` uses against their ranges (rebounce/lights.h).
 /// Throws Error that names the field.
 void check_light(const Light& light);
-
-/// Throws Error with the number of the first light that has a field out of its range.
-void check_lights(std::span<const Light> lights);
 
 }  // namespace rebounce

@@ -10,7 +10,6 @@
 
 #include "rebounce.h"
 #include "runtime/frame/c_handles.h"
-#include "runtime/lights/light_sampling.h"
 #include "runtime/lights/sky_model.h"
 #include "runtime/outputs/vertex_light.h"
 #include "runtime/rays/float3_glm.h"

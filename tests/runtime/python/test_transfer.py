@@ -73,7 +73,7 @@ def test_patches_are_finer_in_the_light_of_the_lamps_of_the_scene():
             scene, patches=300, lights=lights, quality="low", tolerance=0.05, progress=False
         )
         assert data.patch_count == pytest.approx(300, rel=0.03)
-        return data.area[np.linalg.norm(data.centroid - (1, 0, 1), axis=1) < 0.5].max()
+        return data.area[np.linalg.norm(data.centroid - (1, 0, 1), axis=1) < 0.8].max()
 
     assert 2 * largest_below_lamp([lamp]) < largest_below_lamp(None)
     bad = rebounce.Light(position=(1, float("nan"), 1))
