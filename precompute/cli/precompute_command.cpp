@@ -252,10 +252,10 @@ void add_scene_options(CLI::App& command, PrecomputeOptions& chosen) {
       ->check(CLI::PositiveNumber)
       ->excludes(patches)
       ->each([&subdivision](const std::string&) { subdivision.patch_count = 0; });
-  command
-      .add_option("--lights", chosen.lights,
-                  "The scene's own lamps, in place of those of the asset: LIGHTS.json, or a .glb "
-                  "that has some. Patches are finer where their light varies");
+  command.add_option(
+      "--lights", chosen.lights,
+      "The scene's own lamps, in place of those of the asset: LIGHTS.json, or a .glb "
+      "that has some. Patches are finer where their light varies");
   command
       .add_option("--lamp-weight", subdivision.lamp_weight,
                   "How much finer patches are where the direct light of the scene's own lamps "
