@@ -62,8 +62,7 @@ class TransferBuild {
     return scene;
   }
 
-  void describe_scene(Scene& scene) {
-    if (settings_.lights) scene.lights = own_lights(settings_);
+  void describe_scene(const Scene& scene) {
     report_.triangle_count = scene.triangle.size();
     report_.degenerate_triangle_count = scene.degenerate_triangle_count;
     report_.mesh_names = mesh_names(scene);
@@ -142,6 +141,7 @@ class TransferBuild {
 
   /// All that follows on the scene.
   TransferData run(Scene scene) {
+    if (settings_.lights) scene.lights = own_lights(settings_);
     describe_scene(scene);
     make_patches(std::move(scene));
     find_exchange();

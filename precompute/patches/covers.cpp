@@ -5,8 +5,8 @@
 #include <glm/glm.hpp>
 
 #include "precompute/patches/refinement.h"
+#include "precompute/patches/triangle_points.h"
 #include "runtime/rays/float3_glm.h"
-#include "runtime/rays/sampling.h"
 
 namespace rebounce {
 namespace {
@@ -18,7 +18,6 @@ constexpr std::uint32_t kPoints = kMostCoverPoints;
 // this fraction of the way to the middle.
 constexpr std::uint32_t kPointsOfWhole = 12;
 constexpr double kInset = 0.05;
-const glm::dvec2 kTriangleCentre(1.0 / 3);
 
 // Triangles whose longest edge is at most this number of patch sizes are fine enough.
 constexpr double kFinest = 0.3;
@@ -49,7 +48,7 @@ double covered_part(const TriangleCorners& corners, const RayTracer& tracer, dou
   std::array<glm::dvec2, kMostCoverPoints> points;
   const auto some = std::span(points).first(std::min(count, kMostCoverPoints));
   for (std::uint32_t k = 0; k < some.size(); ++k) {
-    some[k] = some.size() == 1 ? kTriangleCentre : square_to_triangle(r2_point(k, {0, 0}));
+    some[k] = triangle_point(k, static_cast<std::uint32_t>(some.size()));
   }
   return static_cast<double>(count_covered(corners, some, tracer, height)) /
          static_cast<double>(some.size());

@@ -7,8 +7,8 @@
 #include "precompute/patches/covers.h"
 #include "precompute/patches/hemisphere_visibility.h"
 #include "precompute/patches/opacity_sampling.h"
+#include "precompute/patches/refinement.h"
 #include "rebounce/error.h"
-#include "runtime/rays/float3_glm.h"
 
 namespace rebounce {
 namespace {
@@ -124,12 +124,8 @@ class SurfaceCutter {
   std::size_t drop_thin(double thinnest) {
     std::size_t kept = 0;
     for (std::size_t t = 0; t < scene_.triangle.size(); ++t) {
-      const auto [a, b, c] = scene_.triangle[t];
-      const glm::dvec3 p = to_dvec3(scene_.position[a]), q = to_dvec3(scene_.position[b]),
-                       r = to_dvec3(scene_.position[c]);
-      const double longest =
-          std::max({glm::distance(p, q), glm::distance(q, r), glm::distance(r, p)});
-      if (glm::length(glm::cross(q - p, r - p)) <= thinnest * longest) continue;
+      const TriangleCorners corners = corners_of(scene_, t);
+      if (2 * area_of(corners) <= thinnest * longest_edge_length(corners)) continue;
       scene_.triangle[kept] = scene_.triangle[t];
       if (!scene_.triangle_mesh.empty()) scene_.triangle_mesh[kept] = scene_.triangle_mesh[t];
       if (!sides_.empty()) sides_[kept] = sides_[t];

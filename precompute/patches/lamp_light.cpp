@@ -7,6 +7,7 @@
 
 #include "precompute/patches/refinement.h"
 #include "precompute/patches/texture_sampling.h"
+#include "precompute/patches/triangle_points.h"
 #include "runtime/lights/light_sampling.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/sampling.h"
@@ -31,12 +32,6 @@ constexpr double kDeviation = 0.02;
 
 // A lamp may lie in a surface: features are at most this number of mean patch sizes.
 constexpr double kLargestFeature = 1e4;
-
-/// Point `k` of `count` of the front of a triangle.
-glm::dvec3 point_of(const TriangleCorners& front, std::uint32_t k, std::uint32_t count) {
-  if (count == 1) return (front[0] + front[1] + front[2]) / 3.0;
-  return point_at(front, square_to_triangle(r2_point(k, glm::dvec2(0))));
-}
 
 /// The luminance of a triangle, cd/m², mean over its surface and the channels.
 double mean_luminance(const Scene& scene, std::uint32_t t) {
@@ -156,8 +151,8 @@ LampLight::Moments LampLight::light_on(const TriangleCorners& front, const RayTr
   LightRays rays;
   std::vector<double> light(count, 0.0);
   for (std::uint32_t k = 0; k < count; ++k) {
-    const Float3 point =
-        tracer.offset_point(to_float3(point_of(front, k, count)), to_float3(normal));
+    const Float3 point = tracer.offset_point(to_float3(point_at(front, triangle_point(k, count))),
+                                             to_float3(normal));
     for (const Light& lamp : lights_) add_lamp(lamp, point, normal, k, rays);
     for (const Emitter& emitter : emitters_) add_emitter(emitter, point, normal, k, rays);
   }
