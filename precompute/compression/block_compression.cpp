@@ -5,8 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
 #include <utility>
+
+#include "precompute/base/random_signs.h"
 
 namespace rebounce {
 namespace {
@@ -43,19 +44,6 @@ Spectrum gram_spectrum(const MatrixXd& a) {
   gram.selfadjointView<Eigen::Lower>().rankUpdate(a);
   const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(gram);
   return descending(solver.eigenvectors(), solver.eigenvalues(), 0);
-}
-
-MatrixXd random_signs(Index rows, Index columns, std::uint64_t seed) {
-  constexpr Index kBits = 64;
-  std::mt19937_64 engine(seed);
-  MatrixXd signs(rows, columns);
-  double* const value = signs.data();
-  for (Index k = 0; k < signs.size(); k += kBits) {
-    const std::uint64_t bits = engine();
-    const Index count = std::min(kBits, signs.size() - k);
-    for (Index b = 0; b < count; ++b) value[k + b] = (bits >> b & 1) != 0 ? 1 : -1;
-  }
-  return signs;
 }
 
 Spectrum sketched_spectrum(const MatrixXd& a, Index sketch_size, std::uint64_t seed) {

@@ -21,9 +21,9 @@ void update(ContentHash& hash, std::span<const T> values) {
 
 }  // namespace
 
-std::string identity_of_panels(const HierarchicalOperator& form_factors, const PatchTable& patches,
-                               const FittingLights& lights, const PatchRoles& roles,
-                               std::span<const double> numbers) {
+std::string identity_of_couplings(const HierarchicalOperator& form_factors,
+                                  const PatchTable& patches, const FittingLights& lights,
+                                  const PatchRoles& roles, std::span<const double> numbers) {
   ContentHash hash;
   update(hash, std::span(std::string_view(version())));
   update<int>(hash, {{kFileFormatVersion}});
@@ -45,10 +45,10 @@ std::string identity_of_panels(const HierarchicalOperator& form_factors, const P
   return hash.text();
 }
 
-std::string identity_of_rounds(const std::string& panels, const FittingLights& lights,
+std::string identity_of_rounds(const std::string& couplings, const FittingLights& lights,
                                const HierarchicalSettings& settings) {
   ContentHash hash;
-  update(hash, std::span(std::string_view(panels)));
+  update(hash, std::span(std::string_view(couplings)));
   update(hash, std::span(&settings.tolerance, 1));
   update(hash, std::span(std::string_view(precision_name(settings.precision))));
   for (const std::vector<Float3>& light : lights.validation) update<Float3>(hash, light);

@@ -10,14 +10,14 @@
 
 namespace rebounce {
 
-/// A hash of all that the panels of build_matrix_free_transfer depend on; `numbers`: what it has
+/// A hash of all that the couplings of build_matrix_free_transfer depend on; `numbers`: what it has
 /// chosen itself.
-std::string identity_of_panels(const HierarchicalOperator& form_factors, const PatchTable& patches,
-                               const FittingLights& lights, const PatchRoles& roles,
-                               std::span<const double> numbers);
+std::string identity_of_couplings(const HierarchicalOperator& form_factors,
+                                  const PatchTable& patches, const FittingLights& lights,
+                                  const PatchRoles& roles, std::span<const double> numbers);
 
-/// A hash of all that the rounds of its search depend on; `panels`: identity_of_panels.
-std::string identity_of_rounds(const std::string& panels, const FittingLights& lights,
+/// A hash of all that the rounds of its search depend on; `couplings`: identity_of_couplings.
+std::string identity_of_rounds(const std::string& couplings, const FittingLights& lights,
                                const HierarchicalSettings& settings);
 
 }  // namespace rebounce

@@ -66,6 +66,12 @@ void ClusterWeight::weigh_columns(Eigen::Ref<MatrixXd> matrix) const {
   matrix.noalias() += part * directions_.transpose();
 }
 
+void ClusterWeight::send(Eigen::Ref<MatrixXd> lights) const {
+  const MatrixXd part = strength_.asDiagonal() * (directions_.transpose() * lights);
+  lights.noalias() += directions_ * part;
+  lights = background_.asDiagonal() * lights;
+}
+
 double ClusterWeight::squared_norm() const {
   // The norm of B (I + P diag(s) P^T), with orthonormal P.
   double sum = background_.squaredNorm();

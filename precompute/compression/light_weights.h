@@ -30,6 +30,9 @@ class ClusterWeight {
   /// matrix = matrix W.
   void weigh_columns(Eigen::Ref<Eigen::MatrixXd> matrix) const;
 
+  /// lights = W lights.
+  void send(Eigen::Ref<Eigen::MatrixXd> lights) const;
+
   /// The sum of the squares of the entries of W. Independent errors of equal size at all positions
   /// grow by this factor in squared norm under W^T, relative to the error at one position.
   double squared_norm() const;

@@ -7,7 +7,6 @@
 #include <string>
 
 #include "precompute/compression/block_tree.h"
-#include "precompute/compression/panel_compressor.h"
 #include "precompute/inverse/solved_transfer.h"
 #include "precompute/lights/fitting_lights.h"
 #include "precompute/patches/patch_selection.h"
@@ -31,17 +30,15 @@ constexpr std::size_t kSearchBytes = 7000, kWorkBytes = 16000, kMostWorkBytes = 
 MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::size_t matrix_count,
                                                  const MatrixFreeTransferSettings& settings) {
   constexpr std::size_t kBlasBytes = 20'000'000;  // of OpenBLAS, for each thread but the first
-  constexpr std::size_t kVectors = 8;             // those of the solver, coefficients, entries of F
-  constexpr std::size_t kBatchColumns = SolvedTransfer::kBatchColumns,
-                        kWidth = PanelCompressor::kPanelWidth;
+  constexpr std::size_t kGroupsOfThread = 4;      // of a run, so that all threads end together
+  constexpr std::size_t kVectors = 9;             // what is sent, those of the solver, coefficients
+  constexpr std::size_t kBatchColumns = SolvedTransfer::kBatchColumns;
   const std::size_t group = kVectors * patch_count * kBatchColumns * sizeof(float);
-  const std::size_t panel = patch_count * kWidth * matrix_count * sizeof(float);
   const std::size_t side =
       largest_piece(static_cast<std::uint32_t>(HierarchicalFormat::position_count(patch_count)));
   // What is compressed of a piece is held in doubles too, but before the operator is whole
   // (lab/114).
   const std::size_t piece = side * side * matrix_count * sizeof(float);
-  const std::size_t groups_of_panel = matrix_count * kWidth / kBatchColumns;
   const std::uint64_t limit = settings.memory_limit_bytes;
   const double operators =
       kOperatorBytes * static_cast<double>(matrix_count) *
@@ -53,9 +50,9 @@ MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::s
   MatrixFreeTransferPlan plan;
   for (plan.thread_count = omp_get_max_threads();; --plan.thread_count) {
     const auto threads = static_cast<std::size_t>(plan.thread_count);
-    plan.panel_count = (threads + groups_of_panel - 1) / groups_of_panel;
-    plan.peak_bytes = std::max(plan.panel_count * panel + threads * group, threads * piece) +
-                      (threads - 1) * kBlasBytes + kept;
+    plan.cell_count = (kGroupsOfThread * threads + matrix_count - 1) / matrix_count;
+    plan.peak_bytes =
+        std::max(threads * group, threads * piece) + (threads - 1) * kBlasBytes + kept;
     if (limit == 0 || plan.peak_bytes <= limit || threads == 1) return plan;
   }
 }

@@ -11,28 +11,28 @@ namespace rebounce {
 
 struct MatrixFreeTransferSettings {
   HierarchicalSettings compression{};  ///< of the result
-  /// Only the transfer from sources to receivers is solved for and stored. The number of solved
-  /// columns is that of sources or of receivers, whichever are fewer.
+  /// Only the transfer from sources to receivers is solved for and stored: for the couplings of
+  /// cells of sources or of receivers, whichever are fewer.
   PatchRoles roles{};
-  /// Limit of the memory beside the form factors, bytes; 0: none. A lower limit means fewer threads
-  /// and panels at a time: slower, with the same bits.
+  /// Limit of the memory beside the form factors, bytes; 0: none. A lower limit means fewer
+  /// threads: slower, with the same bits.
   std::uint64_t memory_limit_bytes = 0;
-  /// Folder that keeps finished work, panels of the first stage and parts of the rounds of the
-  /// second, so that a run that was killed continues; empty: none. Work that was made from other
-  /// arguments is made again. The folder stays behind: remove it when the operator is saved.
+  /// Folder that keeps finished work, couplings of cells and parts of the rounds of the search, so
+  /// that a run that was killed continues; empty: none. Work that was made from other arguments is
+  /// made again. The folder stays behind: remove it when the operator is saved.
   std::filesystem::path checkpoint{};
 };
 
 /// How much work build_matrix_free_transfer does at the same time.
 struct MatrixFreeTransferPlan {
   int thread_count = 1;
-  std::size_t panel_count = 1;  ///< panels, of 512 columns each, that are solved for together
+  std::size_t cell_count = 1;  ///< cells of 512 patches whose couplings are solved for together
   /// At the peak, without the form factors; in proportion to the number of patches.
   std::size_t peak_bytes = 0;
 };
 
 /// The plan with the most threads, at most those of OpenMP, that keeps to the limit of `settings`.
-/// Only a plan with one thread and one panel may be above the limit: no plan takes less.
+/// Only a plan with one thread may be above the limit: no plan takes less.
 MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::size_t matrix_count,
                                                  const MatrixFreeTransferSettings& settings = {});
 

@@ -1,17 +1,24 @@
 #include "precompute/compression/matrix_free_transfer.h"
 
+#include <algorithm>
+#include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "precompute/base/thread_limit.h"
 #include "precompute/compression/block_checkpoint.h"
 #include "precompute/compression/checkpoint_identity.h"
+#include "precompute/compression/coupling_solver.h"
 #include "precompute/compression/matrix_compression.h"
-#include "precompute/compression/panel_compressor.h"
+#include "precompute/compression/sampled_bases.h"
 #include "precompute/compression/tolerance_search.h"
+#include "precompute/compression/wanted_blocks.h"
 #include "precompute/inverse/dense_transfer.h"
 #include "precompute/inverse/hierarchical_matrix.h"
+#include "precompute/inverse/shared_bases.h"
 #include "precompute/inverse/solved_matrix.h"
 #include "precompute/inverse/solved_transfer.h"
 
@@ -24,16 +31,14 @@ constexpr double kResidualPart = 0.35;  // lab/060: a smaller one changes no err
 // The tolerance of the form factors that the steps multiply with, in tolerances of the operator.
 constexpr double kCoarsePart = 4;  // lab/060: half of the time of all form factors
 
-// The multiplier of the first stage, in initial multipliers of the search for the tolerance. Errors
-// grow about like the square root of the multiplier: the first stage has a quarter of the error of
-// the second.
-constexpr double kFinePart = 1.0 / 16;  // lab/060: a coarser one takes no less time
+// The error that bases may leave, in tolerances of the operator.
+constexpr double kBasisPart = 0.3;  // lab/132
 
-// Only for progress: the work before the first panel, again before the first round of the second
-// stage, and of all rounds together, in columns that are solved for (lab/059).
-constexpr double kColumnsBefore = 5500, kColumnsOfRounds = 6000;
+// Only for progress: the work before the first sample, to find bases, and of all rounds of the
+// search together, in vectors that are solved for (lab/059).
+constexpr double kVectorsBefore = 15000, kVectorsOfBases = 3000, kVectorsOfRounds = 40000;
 
-/// Form factors as the steps of columns take them.
+/// Form factors as the steps of solves take them.
 HierarchicalStorage coarser(const HierarchicalOperator& form_factors, const PatchTable& patches,
                             const FittingLights& lights, double tolerance) {
   return compress_matrix(HierarchicalMatrix(form_factors.storage()), patches, lights.training,
@@ -49,6 +54,19 @@ MatrixFreeTransferPlan checked_plan(const PatchTable& patches,
   return plan;
 }
 
+/// Of each cell, whether any entry on or below the diagonal is wanted in its columns.
+std::vector<bool> wanted_columns(const CompressionFrame& frame,
+                                 std::span<const std::uint32_t> cells) {
+  const WantedBlocks blocks(frame.roles, frame.tree);
+  std::vector<bool> wanted(cells.size());
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    for (std::size_t d = c; d < cells.size() && !wanted[c]; ++d) {
+      wanted[c] = blocks.wanted(cells[d], cells[c]);
+    }
+  }
+  return wanted;
+}
+
 }  // namespace
 
 struct MatrixFreeTransfer::State {
@@ -58,12 +76,12 @@ struct MatrixFreeTransfer::State {
         patches(of_patches),
         plan(checked_plan(patches, settings)),
         limited(std::in_place, plan.thread_count),
-        multiplier(kFinePart * initial_multiplier(tolerance(), patches.size())),
-        panels_key(identity_of_panels(form_factors, patches, lights, settings.roles,
-                                      {{multiplier, kResidualPart, kCoarsePart}})),
+        couplings_key(
+            identity_of_couplings(form_factors, patches, lights, settings.roles,
+                                  {{kBasisPart, kResidualPart, kCoarsePart, tolerance()}})),
         solved(form_factors, coarser(form_factors, patches, lights, tolerance()), patches,
                kResidualPart * tolerance()),
-        energies(solved.estimated_energies(settings.roles)) {
+        matrix(solved, solved.estimated_energies(settings.roles), settings.roles) {
     limited.reset();
   }
 
@@ -73,11 +91,9 @@ struct MatrixFreeTransfer::State {
   const PatchTable& patches;
   MatrixFreeTransferPlan plan;
   std::optional<ThreadLimit> limited;  ///< while the members below are made
-  double multiplier;                   ///< of the first stage
-  std::string panels_key;
+  std::string couplings_key;
   SolvedTransfer solved;
-  Eigen::VectorXd energies;
-  std::optional<RoundedMatrix> fine;  ///< what the first stage has compressed
+  SolvedMatrix matrix;
   double solving_part = 0;
 };
 
@@ -88,16 +104,22 @@ MatrixFreeTransfer::MatrixFreeTransfer(const HierarchicalOperator& form_factors,
     : state_(std::make_unique<State>(form_factors, patches, lights, settings)) {
   State& state = *state_;
   const ThreadLimit limited(state.plan.thread_count);
-  const BlockCheckpoint panels(settings.checkpoint, state.panels_key);
-  PanelMatrix matrix(state.solved, state.energies, settings.roles);
-  PanelCompressor stage(matrix, patches, lights.training, state.multiplier, state.plan.panel_count,
-                        panels);
-  const double work = stage.work(), all = 2 * kColumnsBefore + work + kColumnsOfRounds;
-  report_progress(progress, kColumnsBefore / all);
-  state.fine.emplace(
-      state.solved, state.energies,
-      stage.run(part_of(progress, kColumnsBefore / all, (kColumnsBefore + work) / all)));
-  state.solving_part = (2 * kColumnsBefore + work) / all;
+  const BlockCheckpoint checkpoint(settings.checkpoint, state.couplings_key);
+  constexpr double kBefore = kVectorsBefore + kVectorsOfBases;
+  const double usual = kBefore + 0.3 * static_cast<double>(patches.size()) + kVectorsOfRounds;
+  report_progress(progress, kVectorsBefore / usual);
+  const CompressionFrame frame = compression_frame(state.matrix, patches, lights.training);
+  const std::vector<std::uint32_t> cells = clusters_up_to(frame.tree, kBasisCell);
+  SharedBases bases =
+      sample_bases(state.solved, frame, frame.weights(), cells, kBasisPart * state.tolerance(),
+                   part_of(progress, kVectorsBefore / usual, kBefore / usual));
+  CouplingSolver solver(state.solved, bases, wanted_columns(frame, cells), state.plan.cell_count,
+                        checkpoint);
+  const double begin = kBefore / usual, all = kBefore + solver.work() + kVectorsOfRounds;
+  state.solving_part = std::max(begin, (kBefore + solver.work()) / all);
+  std::vector<std::vector<float>> couplings =
+      solver.run(part_of(progress, begin, state.solving_part));
+  state.matrix.set_entries(std::move(bases), std::move(couplings));
 }
 
 MatrixFreeTransfer::~MatrixFreeTransfer() = default;
@@ -113,8 +135,8 @@ std::shared_ptr<const HierarchicalOperator> MatrixFreeTransfer::compress(
   settings.tolerance = tolerance;
   const ThreadLimit limited(state.plan.thread_count);
   const BlockCheckpoint rounds(state.settings.checkpoint,
-                               identity_of_rounds(state.panels_key, lights, settings));
-  return compress_to_tolerance(*state.fine, state.patches, lights, settings, progress, rounds);
+                               identity_of_rounds(state.couplings_key, lights, settings));
+  return compress_to_tolerance(state.matrix, state.patches, lights, settings, progress, rounds);
 }
 
 std::shared_ptr<const HierarchicalOperator> build_matrix_free_transfer(

@@ -10,20 +10,20 @@
 
 namespace rebounce {
 
-/// Builds Y = F (I - rho F)^-1, compressed, without any matrix of all pairs: the columns of Yhat
-/// are solved for by conjugate gradients, a panel of neighbouring patches at a time, and each panel
-/// is compressed finely as soon as it is there. The operator that this leaves, a few times as large
-/// as the result, is then compressed to the tolerance as build_hierarchical_transfer does, as often
-/// as wanted.
+/// Builds Y = F (I - rho F)^-1, compressed, without any matrix of all pairs. What bounces twice and
+/// more, Yhat - G, is far smoother than G. It is solved for by conjugate gradients in bases of
+/// cells of neighbouring patches, which random samples give (sampled_bases.h): a fraction of as
+/// many solves as it has columns, which falls as patches become more. The matrix in these bases is
+/// then compressed to the tolerance as build_hierarchical_transfer does, as often as wanted.
 ///
 /// `form_factors` are a compressed G = A^1/2 F A^-1/2 in f32 or f16 (compress_form_factors). Their
 /// error stays in the result and must be well below the tolerance; the reported error does not
 /// contain it. The bits do not depend on the number of threads, the memory limit or the checkpoint.
 class MatrixFreeTransfer {
  public:
-  /// Solves for the columns. All arguments but the lights must outlive the object. Throws Error if
-  /// the least memory is above the limit, if F is not a passive exchange (I - R G R not positive
-  /// definite), or if the checkpoint cannot be written; Cancelled if asked to stop.
+  /// Solves for the matrix in its bases. All arguments but the lights must outlive the object.
+  /// Throws Error if the least memory is above the limit, if F is not a passive exchange (I - R G R
+  /// not positive definite), or if the checkpoint cannot be written; Cancelled if asked to stop.
   MatrixFreeTransfer(const HierarchicalOperator& form_factors, const PatchTable& patches,
                      const FittingLights& lights, const MatrixFreeTransferSettings& settings,
                      const Progress& progress = {});
@@ -38,7 +38,7 @@ class MatrixFreeTransfer {
                                                        double tolerance,
                                                        const Progress& progress = {}) const;
 
-  /// The part of the time that solving for the columns takes, for progress.
+  /// The part of the time that solving takes, for progress.
   double solving_part() const;
 
  private:

@@ -32,6 +32,17 @@ void product(bool transposed, Index rows, Index columns, const float* matrix, co
   sgemm_("N", transposed ? "T" : "N", &m, &n, &k, &one, from, &m, matrix, &stride, &kept, to, &m);
 }
 
+/// Counts the positions before each at which any vector is not 0, [positions + 1].
+void find_lit(const Vectors& x, std::vector<std::uint32_t>& lit_before) {
+  lit_before.resize(static_cast<std::size_t>(x.rows()) + 1);
+  lit_before[0] = 0;
+  for (Index i = 0; i < x.rows(); ++i) {
+    const bool lit = std::any_of(x.row(i).data(), x.row(i).data() + x.cols(),
+                                 [](float value) { return value != 0; });
+    lit_before[i + 1] = lit_before[i] + (lit ? 1 : 0);
+  }
+}
+
 }  // namespace
 
 struct HierarchicalMatrix::Places {
@@ -201,42 +212,64 @@ void HierarchicalMatrix::multiply(std::uint32_t matrix, const Vectors& x, Vector
   const Index width = x.cols();
   workspace.sent.resize(low_rank_count_, width);
   workspace.received.resize(low_rank_count_, width);
+  find_lit(x, workspace.lit_before);
   y.setZero(x.rows(), width);
   for (const HierarchicalLayout::Cluster& cluster : layout_.clusters) {
+    if (!workspace.is_lit(cluster.begin, cluster.size)) continue;
     product(false, cluster.rank, cluster.size, bases_.data() + cluster.values,
             x.row(cluster.begin).data(), workspace.sent.row(cluster.coefficient).data(), width,
             Write::kSet);
   }
   multiply_blocks(matrix, x, y, workspace);
-  for (const HierarchicalLayout::Cluster& cluster : layout_.clusters) {
+  for (std::size_t c = 0; c < layout_.clusters.size(); ++c) {
+    if (workspace.reached[c] == 0) continue;
+    const HierarchicalLayout::Cluster& cluster = layout_.clusters[c];
     product(true, cluster.size, cluster.rank, bases_.data() + cluster.values,
             workspace.received.row(cluster.coefficient).data(), y.row(cluster.begin).data(), width,
             Write::kAdd);
   }
 }
 
+struct HierarchicalMatrix::Side {
+  Index begin, count;         ///< positions
+  Index first, size;          ///< rows of the vectors that a product reads or writes
+  std::uint32_t cluster = 0;  ///< of a low-rank block
+};
+
+HierarchicalMatrix::Side HierarchicalMatrix::side_of(const TransferBlock& block, std::size_t index,
+                                                     bool row) const {
+  const Index begin = row ? block.row_begin : block.column_begin;
+  const Index count = row ? block.row_count : block.column_count;
+  if (block.kind == TransferBlock::Kind::kDense) return {begin, count, begin, count};
+  const HierarchicalLayout::BlockLayout& block_layout = layout_.block_layouts[index];
+  const HierarchicalLayout::End& end = row ? block_layout.row : block_layout.column;
+  return {begin, count, end.coefficient, row ? block.row_rank : block.column_rank, end.cluster};
+}
+
 /// Multiplies with the coupling matrices, and with all of the dense blocks.
 void HierarchicalMatrix::multiply_blocks(std::uint32_t matrix, const Vectors& x, Vectors& y,
                                          Workspace& workspace) const {
+  workspace.reached.assign(layout_.clusters.size(), 0);
   for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
     const TransferBlock& block = storage_.blocks[b];
     if (!has_values(block)) continue;
     const bool dense = block.kind == TransferBlock::Kind::kDense;
-    const HierarchicalLayout::BlockLayout& block_layout = layout_.block_layouts[b];
-    const Index row = dense ? block.row_begin : block_layout.row.coefficient;
-    const Index column = dense ? block.column_begin : block_layout.column.coefficient;
-    const Index rows = dense ? block.row_count : block.row_rank;
-    const Index columns = dense ? block.column_count : block.column_rank;
     const Vectors& from = dense ? x : workspace.sent;
     Vectors& to = dense ? y : workspace.received;
-    // A coefficient is written by one block, a position by several.
-    const Write write = dense ? Write::kAdd : Write::kSet;
     const float* const entries = coupling(matrix, b);
-    product(false, rows, columns, entries, from.row(column).data(), to.row(row).data(), x.cols(),
-            write);
-    if (block.on_diagonal()) continue;
-    product(true, columns, rows, entries, from.row(row).data(), to.row(column).data(), x.cols(),
-            write);
+    const Side row = side_of(block, b, true), column = side_of(block, b, false);
+    // A coefficient is written by one block, a position by several.
+    const auto pass = [&](const Side& source, const Side& target, bool transposed) {
+      if (workspace.is_lit(source.begin, source.count)) {
+        product(transposed, target.size, source.size, entries, from.row(source.first).data(),
+                to.row(target.first).data(), x.cols(), dense ? Write::kAdd : Write::kSet);
+        if (!dense) workspace.reached[target.cluster] = 1;
+      } else if (!dense) {
+        to.middleRows(target.first, target.size).setZero();
+      }
+    };
+    pass(column, row, false);
+    if (!block.on_diagonal()) pass(row, column, true);
   }
 }
 

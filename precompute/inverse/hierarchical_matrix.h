@@ -35,9 +35,17 @@ class HierarchicalMatrix final : public SymmetricMatrix {
   /// Memory that `multiply` needs beside its vectors.
   struct Workspace {
     Vectors sent, received;  ///< coefficients before and after the coupling matrices
+    /// [positions + 1] positions before each at which any vector is not 0.
+    std::vector<std::uint32_t> lit_before;
+    std::vector<std::uint8_t> reached;  ///< clusters that receive light by a coupling matrix
+
+    bool is_lit(Eigen::Index begin, Eigen::Index count) const {
+      return lit_before[begin + count] > lit_before[begin];
+    }
   };
 
-  /// y = matrix x on the calling thread, both [positions][k]; y must not alias x.
+  /// y = matrix x on the calling thread, both [positions][k]; y must not alias x. What begins where
+  /// all vectors are 0 is left out: vectors of one cluster take a part of the time.
   void multiply(std::uint32_t matrix, const Vectors& x, Vectors& y, Workspace& workspace) const;
 
  private:
@@ -57,6 +65,9 @@ class HierarchicalMatrix final : public SymmetricMatrix {
                  Eigen::Ref<Eigen::MatrixXf> entries) const;
   void multiply_blocks(std::uint32_t matrix, const Vectors& x, Vectors& y,
                        Workspace& workspace) const;
+  /// One side of a block: its positions, its coefficients, and the cluster of its basis.
+  struct Side;
+  Side side_of(const TransferBlock& block, std::size_t index, bool row) const;
   const float* basis(const HierarchicalLayout::End& end) const;
   const float* coupling(std::uint32_t matrix, std::size_t block) const;
 

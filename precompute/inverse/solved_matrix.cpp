@@ -1,103 +1,63 @@
 #include "precompute/inverse/solved_matrix.h"
 
-#include <algorithm>
-#include <exception>
-
-#include "precompute/base/blas.h"
-#include "precompute/base/parallel_progress.h"
-
 namespace rebounce {
-namespace {
 
 using Eigen::Index;
+using Eigen::MatrixXf;
 
-constexpr auto kBatchColumns = static_cast<std::size_t>(SolvedTransfer::kBatchColumns);
+void SolvedMatrix::set_entries(SharedBases bases, std::vector<std::vector<float>> couplings) {
+  bases_ = std::move(bases);
+  couplings_ = std::move(couplings);
+  place_.resize(area().size());
+  for (std::uint32_t c = 0; c < bases_.cell_count(); ++c) {
+    for (std::uint32_t k = 0; k < bases_.patches[c].size(); ++k) {
+      place_[bases_.patches[c][k]] = {c, k};
+    }
+  }
+}
 
-/// Columns that one thread solves for. The first is counted over all panels.
-struct Group {
-  std::uint32_t matrix;
-  std::size_t begin, count;
+struct SolvedMatrix::Run {
+  std::uint32_t cell = 0;
+  Index begin = 0;   ///< of its first patch in the list
+  MatrixXf vectors;  ///< rows of the basis of the cell, [patches of the run][rank]
 };
 
-/// The columns of `panels` that hold patches, in groups. There are `patch_count` patches.
-std::vector<Group> make_groups(std::span<const Cluster> panels, std::size_t patch_count,
-                               std::uint32_t matrix_count) {
-  std::vector<Group> groups;
-  const std::size_t first = panels.front().begin;
-  for (std::uint32_t m = 0; m < matrix_count; ++m) {
-    for (const Cluster& panel : panels) {
-      const std::size_t end = std::min<std::size_t>(panel.begin + panel.count, patch_count);
-      for (std::size_t begin = panel.begin; begin < end; begin += kBatchColumns) {
-        groups.push_back({m, begin - first, std::min(kBatchColumns, end - begin)});
-      }
+std::vector<SolvedMatrix::Run> SolvedMatrix::runs_of(std::uint32_t matrix,
+                                                     std::span<const std::uint32_t> patches) const {
+  std::vector<Run> runs;
+  for (std::size_t begin = 0, end = 0; begin < patches.size(); begin = end) {
+    const std::uint32_t cell = place_[patches[begin]].cell;
+    while (end < patches.size() && place_[patches[end]].cell == cell) ++end;
+    const MatrixXf& basis = bases_.bases[matrix][cell].vectors;
+    Run& run = runs.emplace_back(Run{cell, static_cast<Index>(begin), {}});
+    run.vectors.resize(static_cast<Index>(end - begin), basis.cols());
+    for (std::size_t k = begin; k < end; ++k) {
+      run.vectors.row(static_cast<Index>(k - begin)) = basis.row(place_[patches[k]].index);
     }
   }
-  return groups;
+  return runs;
 }
 
-/// Keeps the memory of the first panel: later panels have fewer rows, and the operating system
-/// clears new pages when they are written to.
-void make_room(SolvedTransfer::Vectors& part, std::size_t rows, std::size_t columns) {
-  const Index rows_had = part.rows(), columns_had = part.cols();
-  if (rows_had >= static_cast<Index>(rows) && columns_had >= static_cast<Index>(columns)) return;
-  part.resize(std::max(rows_had, static_cast<Index>(rows)),
-              std::max(columns_had, static_cast<Index>(columns)));
+void SolvedMatrix::add_later_bounces(std::uint32_t matrix, const Run& row, const Run& column,
+                                     Eigen::Ref<MatrixXf> entries) const {
+  const bool mirrored = row.cell < column.cell;
+  const std::uint32_t low = mirrored ? row.cell : column.cell;
+  if (couplings_[low].empty()) return;
+  const auto coupling =
+      bases_.coupling(matrix, mirrored ? column.cell : row.cell, low, couplings_[low]);
+  auto part = entries.block(row.begin, column.begin, row.vectors.rows(), column.vectors.rows());
+  const MatrixXf right = mirrored ? MatrixXf(coupling.transpose() * column.vectors.transpose())
+                                  : MatrixXf(coupling * column.vectors.transpose());
+  part.noalias() += row.vectors * right;
 }
 
-}  // namespace
-
-void PanelMatrix::solve(const ClusterTree& tree, std::span<const Cluster> panels,
-                        const Progress& progress) {
-  const std::vector<Group> groups = make_groups(panels, tree.patch.size(), matrix_count());
-  const auto rows = std::span(tree.patch).subspan(panels.front().begin);
-  const std::size_t width = groups.back().begin + groups.back().count;
-  panel_.resize(matrix_count());
-  for (auto& part : panel_) make_room(part, rows.size(), width);
-  place_.assign(tree.patch.size(), kNone);
-  for (std::uint32_t k = 0; k < rows.size(); ++k) place_[rows[k]] = k;
-
-  load_blas();
-  std::exception_ptr failure;
-  ParallelProgress loop(progress, groups.size());
-#pragma omp parallel
-  {
-    SolvedTransfer::Workspace workspace;
-#pragma omp for schedule(dynamic, 1)
-    for (std::size_t k = 0; k < groups.size(); ++k) {
-      if (loop.stopped()) continue;
-      const auto [matrix, begin, count] = groups[k];
-      try {
-        keep(solved().columns(matrix, rows.subspan(begin, count), workspace), matrix, begin);
-      } catch (...) {
-#pragma omp critical
-        failure = std::current_exception();
-      }
-      loop.advance();
-    }
-  }
-  if (failure) std::rethrow_exception(failure);
-  loop.finish();
-}
-
-void PanelMatrix::keep(const SolvedTransfer::Vectors& columns, std::uint32_t matrix,
-                       std::size_t begin) {
-  for (std::size_t i = 0; i < place_.size(); ++i) {
-    const std::uint32_t row = place_[solved().patch()[i]];
-    if (row == kNone) continue;
-    panel_[matrix].row(row).segment(static_cast<Index>(begin), columns.cols()) =
-        columns.row(static_cast<Index>(i));
-  }
-}
-
-void PanelMatrix::entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
-                          std::span<const std::uint32_t> columns,
-                          Eigen::Ref<Eigen::MatrixXf> entries) const {
-  const SolvedTransfer::Vectors& panel = panel_[matrix];
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    const auto row = panel.row(place_[rows[i]]);
-    for (std::size_t j = 0; j < columns.size(); ++j) {
-      entries(static_cast<Index>(i), static_cast<Index>(j)) = row[place_[columns[j]]];
-    }
+void SolvedMatrix::entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
+                           std::span<const std::uint32_t> columns,
+                           Eigen::Ref<MatrixXf> entries) const {
+  solved_.form_factors().entries(0, rows, columns, entries);
+  const std::vector<Run> row_runs = runs_of(matrix, rows), column_runs = runs_of(matrix, columns);
+  for (const Run& column : column_runs) {
+    for (const Run& row : row_runs) add_later_bounces(matrix, row, column, entries);
   }
 }
 

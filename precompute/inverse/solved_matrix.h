@@ -1,18 +1,20 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
 #include <vector>
 
-#include "precompute/base/progress.h"
 #include "precompute/base/symmetric_matrix.h"
-#include "precompute/inverse/hierarchical_matrix.h"
+#include "precompute/inverse/shared_bases.h"
 #include "precompute/inverse/solved_transfer.h"
-#include "precompute/patches/cluster_tree.h"
-#include "transfer/format/hierarchical_storage.h"
 
 namespace rebounce {
 
-/// Yhat through its products, which are solved for. Derived classes provide the entries.
-class SolvedMatrix : public SymmetricMatrix {
+/// Yhat through its products, which are solved for, and through entries in shared bases: those of
+/// the form factors, which are exact, and the rest between the bases of cells.
+class SolvedMatrix final : public SymmetricMatrix {
  public:
   /// `solved` must outlive the object; `energies` [n] are those that it estimates with these roles.
   SolvedMatrix(const SolvedTransfer& solved, Eigen::VectorXd energies, PatchRoles roles)
@@ -30,54 +32,33 @@ class SolvedMatrix : public SymmetricMatrix {
     return energies_;
   }
 
- protected:
-  const SolvedTransfer& solved() const { return solved_; }
+  /// What `entries` needs: `bases`, and the couplings of each cell (SharedBases::coupling), empty
+  /// for a cell below which no entries are wanted.
+  void set_entries(SharedBases bases, std::vector<std::vector<float>> couplings);
 
- private:
-  const SolvedTransfer& solved_;
-  Eigen::VectorXd energies_;
-};
-
-/// Exact columns of Yhat, for a few panels of patches at a time.
-class PanelMatrix final : public SolvedMatrix {
- public:
-  using SolvedMatrix::SolvedMatrix;
-
-  /// Solves for the columns of the patches at `panels` of `tree`, neighbours in the order of
-  /// positions, in the rows from there to the end: the lower triangle. The bits of a panel do not
-  /// depend on the other panels. Throws Cancelled if asked to stop.
-  void solve(const ClusterTree& tree, std::span<const Cluster> panels,
-             const Progress& progress = {});
-
-  /// The rows and columns must be covered by the panels.
+  /// Entries between cells without couplings are those of the form factors alone. Call set_entries
+  /// before.
   void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
                std::span<const std::uint32_t> columns,
                Eigen::Ref<Eigen::MatrixXf> entries) const override;
 
  private:
-  /// Keeps solutions [positions][k] as the columns of the panels from `begin` on.
-  void keep(const SolvedTransfer::Vectors& columns, std::uint32_t matrix, std::size_t begin);
+  /// Neighbours in a list of patches that lie in the same cell.
+  struct Run;
+  std::vector<Run> runs_of(std::uint32_t matrix, std::span<const std::uint32_t> patches) const;
+  void add_later_bounces(std::uint32_t matrix, const Run& row, const Run& column,
+                         Eigen::Ref<Eigen::MatrixXf> entries) const;
 
-  std::vector<SolvedTransfer::Vectors> panel_;  ///< of each matrix, at least [rows][columns]
-  std::vector<std::uint32_t> place_;            ///< [n] row and column of a patch
-};
+  /// The cell of a patch, and its index there.
+  struct Place {
+    std::uint32_t cell = 0, index = 0;
+  };
 
-/// Yhat with the entries of an operator that was compressed from it, and with the roles of that
-/// operator. Its products are solved for.
-class RoundedMatrix final : public SolvedMatrix {
- public:
-  RoundedMatrix(const SolvedTransfer& solved, Eigen::VectorXd energies,
-                const HierarchicalStorage& rounded)
-      : SolvedMatrix(solved, std::move(energies), rounded.roles), rounded_(rounded) {}
-
-  void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
-               std::span<const std::uint32_t> columns,
-               Eigen::Ref<Eigen::MatrixXf> entries) const override {
-    rounded_.entries(matrix, rows, columns, entries);
-  }
-
- private:
-  HierarchicalMatrix rounded_;
+  const SolvedTransfer& solved_;
+  Eigen::VectorXd energies_;
+  SharedBases bases_;
+  std::vector<std::vector<float>> couplings_;  ///< by cell
+  std::vector<Place> place_;                   ///< [n]
 };
 
 }  // namespace rebounce

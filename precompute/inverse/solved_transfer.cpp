@@ -152,11 +152,12 @@ void SolvedTransfer::solve(std::uint32_t matrix, const HierarchicalMatrix& form_
   const Eigen::VectorXf& root = root_[matrix];
   Vectors &y = workspace.solution, &r = workspace.residual, &p = workspace.direction;
   Vectors &sent = workspace.sent, &arrived = workspace.arrived;
-  const Index rows = y.rows(), width = y.cols();
+  const Index rows = workspace.first.rows(), width = workspace.first.cols();
   const auto squares = [&](const Vectors& v) {
     return column_sums(rows, width, [&](Index i) { return v.row(i).array().square(); });
   };
-  r.noalias() = root.asDiagonal() * y;
+  y.setZero(workspace.first.rows(), workspace.first.cols());
+  r.noalias() = root.asDiagonal() * workspace.first;
   const Sums allowed = residual_ * residual_ * squares(r);
   solve_leading(matrix, workspace);
   p = r;
@@ -184,13 +185,9 @@ void SolvedTransfer::solve(std::uint32_t matrix, const HierarchicalMatrix& form_
   }
 }
 
-const Vectors& SolvedTransfer::columns(std::uint32_t matrix, std::span<const std::uint32_t> patches,
-                                       Workspace& workspace) const {
-  MatrixXf& seen = workspace.seen;
-  seen.resize(static_cast<Index>(patch().size()), static_cast<Index>(patches.size()));
-  form_factors_.entries(0, patch(), patches, seen);
-  workspace.solution.setZero(position_count(), seen.cols());
-  workspace.solution.topRows(seen.rows()) = seen;
+const Vectors& SolvedTransfer::later_bounces(std::uint32_t matrix, const Vectors& x,
+                                             Workspace& workspace) const {
+  form_factors_.multiply(0, x, workspace.first, workspace.products);
   solve(matrix, coarse_ ? *coarse_ : form_factors_, workspace);
   return workspace.solution;
 }
@@ -209,7 +206,7 @@ MatrixXf SolvedTransfer::multiply(std::uint32_t matrix, const MatrixXf& x) const
     for (std::size_t k = 0; k < patch().size(); ++k) {
       in.row(static_cast<Index>(k)) = x.row(patch()[k]).segment(begin, width);
     }
-    form_factors_.multiply(0, in, workspace.solution, workspace.products);
+    form_factors_.multiply(0, in, workspace.first, workspace.products);
     try {
       solve(matrix, form_factors_, workspace);
     } catch (...) {
@@ -217,7 +214,9 @@ MatrixXf SolvedTransfer::multiply(std::uint32_t matrix, const MatrixXf& x) const
       failure = std::current_exception();
     }
     for (std::size_t k = 0; k < patch().size(); ++k) {
-      result.row(patch()[k]).segment(begin, width) = workspace.solution.row(static_cast<Index>(k));
+      const auto row = static_cast<Index>(k);
+      result.row(patch()[k]).segment(begin, width) =
+          workspace.first.row(row) + workspace.solution.row(row);
     }
   }
   if (failure) std::rethrow_exception(failure);

@@ -34,11 +34,11 @@ class SolvedTransfer {
   SolvedTransfer(const HierarchicalOperator& form_factors, const PatchTable& patches,
                  double residual);
 
-  /// The same, but the steps of `columns` multiply with `coarse`, an approximation of G. The start
-  /// is computed with G itself: R G b without its part in the leading eigenvectors. The steps only
-  /// solve for the small rest, so an error in proportion to it is allowed (V. Simoncini and D. B.
-  /// Szyld, "Theory of inexact Krylov subspace methods and applications to scientific computing",
-  /// 2003).
+  /// The same, but the steps of later_bounces multiply with `coarse`, an approximation of G. The
+  /// start is computed with G itself: R G b without its part in the leading eigenvectors. The steps
+  /// only solve for the small rest, so an error in proportion to it is allowed (V. Simoncini and D.
+  /// B. Szyld, "Theory of inexact Krylov subspace methods and applications to scientific
+  /// computing", 2003).
   SolvedTransfer(const HierarchicalOperator& form_factors, const HierarchicalStorage& coarse,
                  const PatchTable& patches, double residual);
 
@@ -56,16 +56,18 @@ class SolvedTransfer {
   /// Memory of one thread that solves. It grows to what is needed and is kept, because new pages
   /// for every few columns cost time.
   struct Workspace {
+    Vectors first;  ///< G x, the light of the first bounce
     Vectors solution, residual, direction, sent, arrived;
     HierarchicalMatrix::Workspace products;
-    Eigen::MatrixXf seen;  ///< entries of G, [n][k]
   };
 
-  /// The columns of Yhat that belong to `patches`, at most kBatchColumns, as [positions][k], on the
-  /// calling thread. The result is valid until the workspace is used again. Throws Error if the
-  /// steps do not converge.
-  const Vectors& columns(std::uint32_t matrix, std::span<const std::uint32_t> patches,
-                         Workspace& workspace) const;
+  /// (Yhat - G) x, the light of all bounces but the first, for vectors x [positions][k] with k at
+  /// most kBatchColumns, on the calling thread. The result, and the light of the first bounce, are
+  /// valid until the workspace is used again. Throws Error if the steps do not converge.
+  const Vectors& later_bounces(std::uint32_t matrix, const Vectors& x, Workspace& workspace) const;
+
+  /// G.
+  const HierarchicalMatrix& form_factors() const { return form_factors_; }
 
   /// Estimates of the squared norms of the columns in the rows of receivers, summed over all
   /// matrices, [n] by patch. An estimate is the mean of the squares of Yhat s over vectors s of
@@ -88,8 +90,8 @@ class SolvedTransfer {
   /// Adds the part of the solution in the leading eigenvectors, and updates the residual of z.
   void solve_leading(std::uint32_t matrix, Workspace& workspace) const;
 
-  /// Turns G b into Yhat b: both are the solution in `workspace`. The steps multiply with
-  /// `form_factors`.
+  /// From the first bounce G b in `workspace`, finds the later ones, (Yhat - G) b: the solution
+  /// there. The steps multiply with `form_factors`.
   void solve(std::uint32_t matrix, const HierarchicalMatrix& form_factors,
              Workspace& workspace) const;
 

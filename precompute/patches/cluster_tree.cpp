@@ -144,6 +144,22 @@ ClusterTree build_cluster_tree(const PatchTable& patches, std::uint32_t leaf_siz
   return TreeBuilder(patches, leaf_size, alignment, group).take();
 }
 
+std::vector<std::uint32_t> clusters_up_to(const ClusterTree& tree, std::uint32_t most) {
+  std::vector<std::uint32_t> chosen, left{0};
+  while (!left.empty()) {
+    const std::uint32_t index = left.back();
+    left.pop_back();
+    const Cluster& cluster = tree.clusters[index];
+    if (cluster.count <= most || cluster.is_leaf()) {
+      chosen.push_back(index);
+    } else {
+      left.push_back(cluster.first_child + 1);
+      left.push_back(cluster.first_child);
+    }
+  }
+  return chosen;
+}
+
 std::span<const std::uint32_t> patches_of(const ClusterTree& tree, const Cluster& cluster) {
   const std::size_t end = std::min<std::size_t>(cluster.begin + cluster.count, tree.patch.size());
   return {tree.patch.data() + cluster.begin, tree.patch.data() + end};

@@ -37,6 +37,10 @@ ClusterTree build_cluster_tree(
     std::uint32_t alignment = static_cast<std::uint32_t>(HierarchicalFormat::kAlignment),
     std::span<const std::uint8_t> group = {});
 
+/// The largest clusters of at most `most` positions, and leaves, by index: they cover all
+/// positions, in their order.
+std::vector<std::uint32_t> clusters_up_to(const ClusterTree& tree, std::uint32_t most);
+
 /// The patches at the positions of a cluster.
 std::span<const std::uint32_t> patches_of(const ClusterTree& tree, const Cluster& cluster);
 

@@ -15,7 +15,7 @@
 namespace rebounce::test_block_checkpoint {
 namespace {
 
-const std::string kName = "panel_0000", kOther = "panel_0001";
+const std::string kName = "cell_0000", kOther = "cell_0001";
 
 BlockPart some_part(std::size_t value_count) {
   BlockPart part;

@@ -83,7 +83,7 @@ const ColouredRoom& coloured_room() {
   return room;
 }
 
-/// Of two panels.
+/// Of two cells.
 const GreyRoom& small_room() {
   static const GreyRoom room(560);
   return room;
@@ -158,12 +158,15 @@ std::vector<double> column_errors(const SolvedTransfer& solved, const ColouredRo
   std::vector<double> errors;
   for (const std::size_t begin : {0U, 320U, 640U}) {
     const std::size_t count = std::min<std::size_t>(40, room.patches.size() - begin);
-    const auto patches = solved.patch().subspan(begin, count);
-    const SolvedTransfer::Vectors& columns = solved.columns(1, patches, workspace);
+    SolvedTransfer::Vectors sent = SolvedTransfer::Vectors::Zero(solved.position_count(), count);
+    sent.middleRows(begin, count).setIdentity();
+    SolvedTransfer::Vectors columns = solved.later_bounces(1, sent, workspace);
+    columns += workspace.first;
     double error = 0, norm = 0;
     for (std::size_t i = 0; i < room.patches.size(); ++i) {
       for (std::size_t j = 0; j < count; ++j) {
-        const double exact = room.dense->symmetric_entry(1, solved.patch()[i], patches[j]);
+        const double exact =
+            room.dense->symmetric_entry(1, solved.patch()[i], solved.patch()[begin + j]);
         error += std::pow(columns(i, j) - exact, 2);
         norm += exact * exact;
       }
@@ -291,9 +294,9 @@ TEST(MatrixFreeTransfer, SameBitsForAnyNumberOfThreadsAndAnyMemory) {
       plan_matrix_free_transfer(room.patches.size(), 1, {.compression = kCoarse});
   const MatrixFreeTransferPlan least = plan_matrix_free_transfer(
       room.patches.size(), 1, {.compression = kCoarse, .memory_limit_bytes = 1});
-  ASSERT_GT(room.patches.size(), 1024U) << "not four panels";
-  ASSERT_EQ(free.panel_count, 2U);
-  ASSERT_EQ(least.panel_count, 1U);
+  ASSERT_GT(room.patches.size(), 1024U) << "not four cells";
+  ASSERT_EQ(free.cell_count, 24U);
+  ASSERT_EQ(least.cell_count, 4U);
   const auto six = build(room);
   const auto limited =
       build_matrix_free_transfer(*room.form_factors, room.patches, room.lights(),
@@ -304,7 +307,7 @@ TEST(MatrixFreeTransfer, SameBitsForAnyNumberOfThreadsAndAnyMemory) {
   expect_same(*one, *limited);
 }
 
-TEST(MatrixFreeTransfer, MorePanelsAndThreadsForMoreMemory) {
+TEST(MatrixFreeTransfer, MoreThreadsForMoreMemory) {
   const int before = omp_get_max_threads();
   omp_set_num_threads(16);
   for (const std::size_t matrices : {1U, 3U}) {
@@ -312,9 +315,8 @@ TEST(MatrixFreeTransfer, MorePanelsAndThreadsForMoreMemory) {
                                  least = plan_matrix_free_transfer(65536, matrices,
                                                                    {.memory_limit_bytes = 1});
     EXPECT_EQ(free.thread_count, 16);
-    EXPECT_EQ(free.panel_count, matrices == 1 ? 4U : 2U) << "not enough columns for all threads";
+    EXPECT_GE(free.cell_count * matrices, 64U) << "not enough vectors for all threads";
     EXPECT_EQ(least.thread_count, 1);
-    EXPECT_EQ(least.panel_count, 1U);
     MatrixFreeTransferPlan last = least;
     int narrowed = 0;
     for (std::size_t limit = least.peak_bytes; limit < free.peak_bytes; limit += 100 << 20) {
@@ -322,7 +324,6 @@ TEST(MatrixFreeTransfer, MorePanelsAndThreadsForMoreMemory) {
           plan_matrix_free_transfer(65536, matrices, {.memory_limit_bytes = limit});
       EXPECT_LE(plan.peak_bytes, limit);
       EXPECT_GE(plan.thread_count, last.thread_count);
-      EXPECT_GE(plan.panel_count, last.panel_count);
       narrowed += plan.thread_count > 1 ? 1 : 0;
       last = plan;
     }
@@ -331,21 +332,22 @@ TEST(MatrixFreeTransfer, MorePanelsAndThreadsForMoreMemory) {
   omp_set_num_threads(before);
 }
 
-TEST(MatrixFreeTransfer, GoesOnFromItsPanelCompressorWithTheSameBits) {
+TEST(MatrixFreeTransfer, GoesOnFromItsCouplingsWithTheSameBits) {
   const test::TemporaryFolder folder;
-  ASSERT_EQ(build_up_to(folder / "panel_0000"), Names{"panel_0000"});
+  const Names written = build_up_to(folder / "cell_0000");
+  EXPECT_FALSE(written.contains("round_0_part_0000"));
   expect_same(*build(small_room(), folder.path()), uninterrupted());
-  EXPECT_EQ(untouched_in(folder.path()), Names{"panel_0000"}) << "done again";
+  EXPECT_EQ(untouched_in(folder.path()), written) << "done again";
   // Now only the first is missing.
-  std::filesystem::remove(folder / "panel_0000");
+  std::filesystem::remove(folder / "cell_0000");
   expect_same(*build(small_room(), folder.path()), uninterrupted());
 }
 
-TEST(MatrixFreeTransfer, GoesOnFromItsSecondStageWithTheSameBits) {
+TEST(MatrixFreeTransfer, GoesOnFromItsRoundsWithTheSameBits) {
   const test::TemporaryFolder folder;
   for (const std::string part : {"round_0_part_0000", "round_1_part_0000"}) {
     const Names written = build_up_to(folder / part);
-    EXPECT_TRUE(written.contains("panel_0001"));
+    EXPECT_TRUE(written.contains("cell_0001"));
     expect_same(*build(small_room(), folder.path()), uninterrupted());
     EXPECT_EQ(untouched_in(folder.path()), written) << "done again";
     std::filesystem::remove(folder / "round_1_part_0000");
@@ -359,17 +361,17 @@ TEST(MatrixFreeTransfer, BeginsAnewWhereTheCheckpointIsOfSomethingElseOrDamaged)
   build(darker, folder.path());
   expect_same(*build(small_room(), folder.path()), uninterrupted());
 
-  // The same first stage, but another second one.
+  // The same couplings, but another search.
   GreyRoom validated_otherwise = small_room();
   std::swap(validated_otherwise.validation.front(), validated_otherwise.validation.back());
   date_back(folder.path());
   build(validated_otherwise, folder.path());
   const Names kept = untouched_in(folder.path());
-  EXPECT_TRUE(kept.contains("panel_0000"));
+  EXPECT_TRUE(kept.contains("cell_0000"));
   EXPECT_FALSE(kept.contains("round_0_part_0000"));
 
-  flip_a_byte(folder / "panel_0000");
-  std::filesystem::resize_file(folder / "panel_0001", 200);
+  flip_a_byte(folder / "cell_0000");
+  std::filesystem::resize_file(folder / "cell_0001", 200);
   flip_a_byte(folder / "round_0_part_0000");
   expect_same(*build(small_room(), folder.path()), uninterrupted());
 }

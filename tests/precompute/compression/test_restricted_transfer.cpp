@@ -170,23 +170,23 @@ TEST(ReceiversAndSources, SameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(one.patch, four.patch);
 }
 
-/// Of columns that were solved for together, in a checkpoint.
-int panel_count(const std::filesystem::path& folder) {
+/// Of cells whose couplings were solved for, in a checkpoint.
+int cell_count(const std::filesystem::path& folder) {
   int count = 0;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    count += entry.path().filename().string().starts_with("panel_") ? 1 : 0;
+    count += entry.path().filename().string().starts_with("cell_") ? 1 : 0;
   }
   return count;
 }
 
-TEST(ReceiversAndSources, OnlyTheirColumnsAreSolvedFor) {
+TEST(ReceiversAndSources, OnlyTheirCouplingsAreSolvedFor) {
   const auto form_factors =
       compress_form_factors(room().exchange, room().patches, {room().training, room().validation},
                             {.tolerance = 1e-3, .precision = Precision::kF32});
-  const auto build = [&](const PatchRoles& roles, const std::filesystem::path& panels) {
+  const auto build = [&](const PatchRoles& roles, const std::filesystem::path& cells) {
     MatrixFreeTransferSettings settings{.compression = {.tolerance = 0.01}};
     settings.roles = roles;
-    settings.checkpoint = panels;
+    settings.checkpoint = cells;
     return build_matrix_free_transfer(*form_factors, room().patches,
                                       {room().training, room().validation}, settings);
   };
@@ -196,9 +196,9 @@ TEST(ReceiversAndSources, OnlyTheirColumnsAreSolvedFor) {
   for (const Choice& choice :
        {Choice{"few receivers", corner, anywhere}, Choice{"few sources", anywhere, corner}}) {
     SCOPED_TRACE(choice.name);
-    const auto panels = folder / choice.name;
-    const auto some = build(roles_at(room().patches, choice.receivers, choice.sources), panels);
-    EXPECT_LT(panel_count(panels), panel_count(folder / "all"));
+    const auto cells = folder / choice.name;
+    const auto some = build(roles_at(room().patches, choice.receivers, choice.sources), cells);
+    EXPECT_LT(cell_count(cells), cell_count(folder / "all"));
     EXPECT_LT(room().mean_error(*some, room().others), 0.015);
   }
 }

@@ -80,6 +80,23 @@ TEST_P(HierarchicalMatrixOf, ProductsAreThoseOfItsEntries) {
   }
 }
 
+TEST_P(HierarchicalMatrixOf, WhatIsDarkIsLeftOutOfProducts) {
+  const Eigen::Index n = matrix.position_count();
+  HierarchicalMatrix::Workspace workspace;
+  HierarchicalMatrix::Vectors of_part, sum = HierarchicalMatrix::Vectors::Zero(n, 3), all;
+  const HierarchicalMatrix::Vectors x = HierarchicalMatrix::Vectors::Random(n, 3);
+  for (const auto& [begin, end] : {std::pair(0, 20), std::pair(20, 21), std::pair(21, int(n))}) {
+    HierarchicalMatrix::Vectors part = HierarchicalMatrix::Vectors::Zero(n, 3);
+    part.middleRows(begin, end - begin) = x.middleRows(begin, end - begin);
+    matrix.multiply(0, part, of_part, workspace);
+    sum += of_part;
+  }
+  matrix.multiply(0, x, all, workspace);
+  EXPECT_LT((sum - all).norm(), 1e-5F * all.norm());
+  matrix.multiply(0, HierarchicalMatrix::Vectors::Zero(n, 3), all, workspace);
+  EXPECT_EQ(all.norm(), 0);
+}
+
 TEST_P(HierarchicalMatrixOf, SameBitsForAnyNumberOfThreads) {
   const Eigen::MatrixXf x = Eigen::MatrixXf::Random(kPatchCount, 100);
   const auto make = [&] { return matrix.multiply(0, x); };

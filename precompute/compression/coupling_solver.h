@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "precompute/base/progress.h"
+#include "precompute/compression/block_checkpoint.h"
+#include "precompute/inverse/shared_bases.h"
+#include "precompute/inverse/solved_transfer.h"
+
+namespace rebounce {
+
+/// Solves for the couplings of shared bases, some cells at a time.
+class CouplingSolver {
+ public:
+  /// Finds the cells that `checkpoint` holds. `is_wanted`: of each cell, whether its couplings are.
+  /// The arguments must outlive the object. `cells_together` > 0 cells are solved for at the same
+  /// time; the bits do not depend on it. Ranks take runs of so many cells in turns.
+  CouplingSolver(const SolvedTransfer& solved, const SharedBases& bases,
+                 std::vector<bool> is_wanted, std::size_t cells_together,
+                 const BlockCheckpoint& checkpoint);
+
+  /// The vectors that this rank has to solve for.
+  double work() const;
+
+  /// Does the work and keeps the couplings of every cell in the checkpoint. Returns those of all
+  /// cells, empty where they are not wanted. Call it once. Throws Cancelled if asked to stop.
+  std::vector<std::vector<float>> run(const Progress& progress);
+
+ private:
+  /// Vectors of a cell that one thread solves for.
+  struct Group {
+    std::size_t cell;
+    std::uint32_t matrix;
+    Eigen::Index begin, count;
+  };
+
+  bool is_missing(std::size_t cell) const;
+  double work_of(std::size_t first) const;  ///< of the run that begins with this cell
+  std::vector<Group> groups_of(std::size_t first) const;
+  void solve_run(std::size_t first, const Progress& progress);
+  void solve(const Group& group, SolvedTransfer::Workspace& workspace);
+
+  const SolvedTransfer& solved_;
+  const SharedBases& bases_;
+  std::vector<bool> is_wanted_;
+  std::size_t together_;
+  const BlockCheckpoint& checkpoint_;
+  std::vector<std::vector<std::uint32_t>> position_;  ///< of the patches of each cell
+  std::vector<std::vector<float>> couplings_;         ///< by cell; empty until they are known
+};
+
+}  // namespace rebounce
