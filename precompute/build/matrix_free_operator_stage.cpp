@@ -129,7 +129,7 @@ class LinkedOperator {
     check(decided_.form_factors.seed);
     const double finer = finer_tolerance(data_.record);
     if (finer > 0) make_again(finer);
-    columns_.reset();
+    solved_.reset();
     report_.whole_error = clock_.run("check by rays", [&](const Progress& part) {
       return whole_->estimate(shown_patch, tracer_, reference_.preconditioned(data_.transfer),
                               part);
@@ -178,8 +178,8 @@ class LinkedOperator {
     settings.checkpoint = decided_.checkpoint;
     data_.transfer = clock_.run("operator", [&](const Progress& part) {
       const FittingLights lights = lights_.exitances.view();
-      columns_.emplace(*data_.compressed_form_factors, data_.patches, lights, settings, part);
-      return columns_->compress(lights, tolerance(), part_of(part, columns_->solving_part(), 1));
+      solved_.emplace(*data_.compressed_form_factors, data_.patches, lights, settings, part);
+      return solved_->compress(lights, tolerance(), part_of(part, solved_->solving_part(), 1));
     });
     report_.form_factor_error = form_factor_error(*data_.compressed_form_factors, *links_,
                                                   data_.patches, lights_.test_radiosities);
@@ -201,14 +201,14 @@ class LinkedOperator {
     record_build(decided_, report_, errors_, data_);
   }
 
-  /// Makes the operator again from the columns that are there, for a smaller tolerance of the
+  /// Makes the operator again from the bases that are there, for a smaller tolerance of the
   /// light, and checks it under lights that the first check has not seen.
   void make_again(double finer) {
     whole_.reset();
     data_.transfer = clock_.run("operator again", [&](const Progress& part) {
       const DrawnLights lights =
           draw_fitting_lights(data_, tracer_, decided_.form_factors.seed, roles_);
-      return columns_->compress(lights.view(), kCompressionPart * finer, part);
+      return solved_->compress(lights.view(), kCompressionPart * finer, part);
     });
     check(decided_.form_factors.seed + 1);
   }
@@ -222,7 +222,7 @@ class LinkedOperator {
   std::shared_ptr<const LinkedFormFactors> links_;  ///< from the first light to the last check
   ReferenceSolver reference_;
   FittedLights lights_;
-  std::optional<MatrixFreeTransfer> columns_;
+  std::optional<MatrixFreeTransfer> solved_;
   std::optional<WholeErrorEstimator> whole_;
   std::vector<KindError> errors_;
 };

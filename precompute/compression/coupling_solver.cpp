@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <exception>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "precompute/base/blas.h"
 #include "precompute/base/parallel_progress.h"
 #include "precompute/base/ranks.h"
+#include "precompute/compression/wanted_blocks.h"
 
 namespace rebounce {
 namespace {
@@ -21,19 +23,31 @@ std::string name_of(std::size_t cell) {
   return fmt::format("cell_{:04}", cell);
 }
 
+/// Of each cell, whether any entry on or below the diagonal is wanted in its columns.
+std::vector<bool> wanted_columns(const FramedCells& framed) {
+  const WantedBlocks blocks(framed.frame.roles, framed.frame.tree);
+  const auto cells = framed.clusters;
+  std::vector<bool> wanted(cells.size());
+  for (std::size_t c = 0; c < cells.size(); ++c) {
+    for (std::size_t d = c; d < cells.size() && !wanted[c]; ++d) {
+      wanted[c] = blocks.wanted(cells[d], cells[c]);
+    }
+  }
+  return wanted;
+}
+
 }  // namespace
 
 CouplingSolver::CouplingSolver(const SolvedTransfer& solved, const SharedBases& bases,
-                               std::vector<bool> is_wanted, std::size_t cells_together,
+                               const FramedCells& cells, std::size_t cells_together,
                                const BlockCheckpoint& checkpoint)
     : solved_(solved),
       bases_(bases),
-      is_wanted_(std::move(is_wanted)),
+      is_wanted_(wanted_columns(cells)),
       together_(Ranks().least(cells_together)),
       checkpoint_(checkpoint),
       couplings_(bases.cell_count()) {
-  std::vector<std::uint32_t> position(solved.patch().size());
-  for (std::uint32_t k = 0; k < position.size(); ++k) position[solved.patch()[k]] = k;
+  const auto position = solved.form_factors().position();
   for (std::size_t cell = 0; cell < bases.cell_count(); ++cell) {
     std::vector<std::uint32_t>& own = position_.emplace_back();
     for (const std::uint32_t p : bases.patches[cell]) own.push_back(position[p]);

@@ -2,25 +2,32 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <string>
+#include <span>
 #include <vector>
 
 #include "precompute/base/progress.h"
 #include "precompute/compression/block_checkpoint.h"
+#include "precompute/compression/matrix_compression.h"
 #include "precompute/inverse/shared_bases.h"
 #include "precompute/inverse/solved_transfer.h"
 
 namespace rebounce {
 
+/// The cells of shared bases, as clusters of the tree of a frame.
+struct FramedCells {
+  const CompressionFrame& frame;
+  std::span<const std::uint32_t> clusters;
+};
+
 /// Solves for the couplings of shared bases, some cells at a time.
 class CouplingSolver {
  public:
-  /// Finds the cells that `checkpoint` holds. `is_wanted`: of each cell, whether its couplings are.
-  /// The arguments must outlive the object. `cells_together` > 0 cells are solved for at the same
+  /// Finds the cells that `checkpoint` holds. Couplings are wanted of cells in whose columns an
+  /// entry on or below the diagonal is, by the roles of the frame. `solved`, `bases` and
+  /// `checkpoint` must outlive the object. `cells_together` > 0 cells are solved for at the same
   /// time; the bits do not depend on it. Ranks take runs of so many cells in turns.
-  CouplingSolver(const SolvedTransfer& solved, const SharedBases& bases,
-                 std::vector<bool> is_wanted, std::size_t cells_together,
-                 const BlockCheckpoint& checkpoint);
+  CouplingSolver(const SolvedTransfer& solved, const SharedBases& bases, const FramedCells& cells,
+                 std::size_t cells_together, const BlockCheckpoint& checkpoint);
 
   /// The vectors that this rank has to solve for.
   double work() const;

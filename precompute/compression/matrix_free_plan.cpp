@@ -16,9 +16,8 @@
 namespace rebounce {
 namespace {
 
-// Bytes per patch, for each matrix, of the operator of the first stage and the rounds of the
-// second, as measured (lab/114). They hold at the default tolerance and grow with this power of 1 /
-// tolerance.
+// Bytes per patch, for each matrix, of bases, couplings and the rounds of the search, as measured
+// (lab/114, lab/132). They hold at the default tolerance and grow with this power of 1 / tolerance.
 constexpr double kOperatorBytes = 8.4e3, kOperatorGrowth = 0.4;
 
 // Of a patch while a dense operator is compressed, beside the lights: candidates of the search and

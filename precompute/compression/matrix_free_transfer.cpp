@@ -1,6 +1,8 @@
 #include "precompute/compression/matrix_free_transfer.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -15,10 +17,7 @@
 #include "precompute/compression/matrix_compression.h"
 #include "precompute/compression/sampled_bases.h"
 #include "precompute/compression/tolerance_search.h"
-#include "precompute/compression/wanted_blocks.h"
 #include "precompute/inverse/dense_transfer.h"
-#include "precompute/inverse/hierarchical_matrix.h"
-#include "precompute/inverse/shared_bases.h"
 #include "precompute/inverse/solved_matrix.h"
 #include "precompute/inverse/solved_transfer.h"
 
@@ -34,9 +33,14 @@ constexpr double kCoarsePart = 4;  // lab/060: half of the time of all form fact
 // The error that bases may leave, in tolerances of the operator.
 constexpr double kBasisPart = 0.3;  // lab/132
 
-// Only for progress: the work before the first sample, to find bases, and of all rounds of the
-// search together, in vectors that are solved for (lab/059).
-constexpr double kVectorsBefore = 15000, kVectorsOfBases = 3000, kVectorsOfRounds = 40000;
+// Only for progress: the work before the first sample, to find bases, and of the search, in vectors
+// that are solved for (lab/132).
+constexpr double kVectorsBefore = 7000, kVectorsOfBases = 5500, kVectorsOfRounds = 25000;
+
+// Only for progress: the number of vectors for each matrix, before it is known (lab/132).
+double usual_vectors(std::size_t patch_count) {
+  return 13 * std::pow(static_cast<double>(patch_count), 0.57);
+}
 
 /// Form factors as the steps of solves take them.
 HierarchicalStorage coarser(const HierarchicalOperator& form_factors, const PatchTable& patches,
@@ -52,19 +56,6 @@ MatrixFreeTransferPlan checked_plan(const PatchTable& patches,
       plan_matrix_free_transfer(patches.size(), distinct_channels(patches.reflectance), settings);
   check_memory(patches.size(), plan, settings);
   return plan;
-}
-
-/// Of each cell, whether any entry on or below the diagonal is wanted in its columns.
-std::vector<bool> wanted_columns(const CompressionFrame& frame,
-                                 std::span<const std::uint32_t> cells) {
-  const WantedBlocks blocks(frame.roles, frame.tree);
-  std::vector<bool> wanted(cells.size());
-  for (std::size_t c = 0; c < cells.size(); ++c) {
-    for (std::size_t d = c; d < cells.size() && !wanted[c]; ++d) {
-      wanted[c] = blocks.wanted(cells[d], cells[c]);
-    }
-  }
-  return wanted;
 }
 
 }  // namespace
@@ -106,15 +97,15 @@ MatrixFreeTransfer::MatrixFreeTransfer(const HierarchicalOperator& form_factors,
   const ThreadLimit limited(state.plan.thread_count);
   const BlockCheckpoint checkpoint(settings.checkpoint, state.couplings_key);
   constexpr double kBefore = kVectorsBefore + kVectorsOfBases;
-  const double usual = kBefore + 0.3 * static_cast<double>(patches.size()) + kVectorsOfRounds;
+  const double usual =
+      kBefore + state.solved.matrix_count() * usual_vectors(patches.size()) + kVectorsOfRounds;
   report_progress(progress, kVectorsBefore / usual);
   const CompressionFrame frame = compression_frame(state.matrix, patches, lights.training);
   const std::vector<std::uint32_t> cells = clusters_up_to(frame.tree, kBasisCell);
   SharedBases bases =
       sample_bases(state.solved, frame, frame.weights(), cells, kBasisPart * state.tolerance(),
                    part_of(progress, kVectorsBefore / usual, kBefore / usual));
-  CouplingSolver solver(state.solved, bases, wanted_columns(frame, cells), state.plan.cell_count,
-                        checkpoint);
+  CouplingSolver solver(state.solved, bases, {frame, cells}, state.plan.cell_count, checkpoint);
   const double begin = kBefore / usual, all = kBefore + solver.work() + kVectorsOfRounds;
   state.solving_part = std::max(begin, (kBefore + solver.work()) / all);
   std::vector<std::vector<float>> couplings =

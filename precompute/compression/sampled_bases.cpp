@@ -104,8 +104,7 @@ class BasisSampler {
   BasisSampler(const SolvedTransfer& solved, const CompressionFrame& frame,
                const std::vector<ClusterWeight>& weights, const std::vector<std::uint32_t>& cells)
       : solved_(solved), frame_(frame), energy_(energy_of_samples(frame)) {
-    std::vector<std::uint32_t> position(solved.patch().size());
-    for (std::uint32_t k = 0; k < position.size(); ++k) position[solved.patch()[k]] = k;
+    const auto position = solved.form_factors().position();
     for (const std::uint32_t index : cells) {
       Cell& cell = cells_.emplace_back();
       cell.cluster = frame.tree.clusters[index];

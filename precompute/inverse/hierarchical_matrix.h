@@ -31,6 +31,8 @@ class HierarchicalMatrix final : public SymmetricMatrix {
   Eigen::Index position_count() const;
   /// [positions] patch at each.
   std::span<const std::uint32_t> patch() const { return storage_.patch; }
+  /// [n] position of each patch.
+  std::span<const std::uint32_t> position() const { return position_; }
 
   /// Memory that `multiply` needs beside its vectors.
   struct Workspace {

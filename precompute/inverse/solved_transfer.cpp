@@ -73,11 +73,32 @@ Factors quotient(const Sums& a, const Sums& b) {
   return (b > 0).select(a / b, 0).cast<float>();
 }
 
+/// The product by position; threads share the columns.
+Vectors gather_all(const HierarchicalMatrix& matrix, const Vectors& x) {
+  load_blas();
+  const Ranks ranks;
+  MatrixXf result(x.rows(), x.cols());
+#pragma omp parallel for schedule(dynamic, 1)
+  for (Index begin = 0; begin < x.cols(); begin += kSmallGroup) {
+    if (!ranks.makes(static_cast<std::size_t>(begin / kSmallGroup))) continue;
+    const Index width = std::min(kSmallGroup, x.cols() - begin);
+    Vectors out;
+    HierarchicalMatrix::Workspace workspace;
+    matrix.multiply(0, x.middleCols(begin, width), out, workspace);
+    result.middleCols(begin, width) = out;
+  }
+  share_groups(ranks, result);
+  return result;
+}
+
 }  // namespace
 
-SolvedTransfer::SolvedTransfer(const HierarchicalOperator& form_factors, const PatchTable& patches,
+SolvedTransfer::SolvedTransfer(const HierarchicalOperator& form_factors,
+                               std::optional<HierarchicalMatrix> coarse, const PatchTable& patches,
                                double residual)
-    : form_factors_(form_factors.storage()), residual_(residual) {
+    : form_factors_(form_factors.storage()), coarse_(std::move(coarse)), residual_(residual) {
+  if (coarse_ && !std::ranges::equal(coarse_->patch(), patch()))
+    throw Error("coarse form factors: their patches are in another order than those of all");
   const std::uint32_t count = distinct_channels(patches.reflectance, channel_matrix_);
   for (std::uint32_t m = 0; m < count; ++m) {
     const auto channel = std::ranges::find(channel_matrix_, m) - channel_matrix_.begin();
@@ -89,29 +110,15 @@ SolvedTransfer::SolvedTransfer(const HierarchicalOperator& form_factors, const P
   }
 }
 
+SolvedTransfer::SolvedTransfer(const HierarchicalOperator& form_factors, const PatchTable& patches,
+                               double residual)
+    : SolvedTransfer(form_factors, std::optional<HierarchicalMatrix>(), patches, residual) {}
+
 SolvedTransfer::SolvedTransfer(const HierarchicalOperator& form_factors,
                                const HierarchicalStorage& coarse, const PatchTable& patches,
                                double residual)
-    : SolvedTransfer(form_factors, patches, residual) {
-  coarse_.emplace(coarse);
-}
-
-Vectors SolvedTransfer::gather(const Vectors& x) const {
-  load_blas();
-  const Ranks ranks;
-  MatrixXf result(x.rows(), x.cols());
-#pragma omp parallel for schedule(dynamic, 1)
-  for (Index begin = 0; begin < x.cols(); begin += kSmallGroup) {
-    if (!ranks.makes(static_cast<std::size_t>(begin / kSmallGroup))) continue;
-    const Index width = std::min(kSmallGroup, x.cols() - begin);
-    Vectors out;
-    HierarchicalMatrix::Workspace workspace;
-    form_factors_.multiply(0, x.middleCols(begin, width), out, workspace);
-    result.middleCols(begin, width) = out;
-  }
-  share_groups(ranks, result);
-  return result;
-}
+    : SolvedTransfer(form_factors, std::make_optional<HierarchicalMatrix>(coarse), patches,
+                     residual) {}
 
 /// By subspace iteration.
 SolvedTransfer::Leading SolvedTransfer::find_leading(const Eigen::VectorXf& root) const {
@@ -124,8 +131,10 @@ SolvedTransfer::Leading SolvedTransfer::find_leading(const Eigen::VectorXf& root
   for (int step = 0;; ++step) {
     const Eigen::HouseholderQR<MatrixXf> qr(root.asDiagonal() * leading.vectors);
     leading.vectors = qr.householderQ() * MatrixXf::Identity(position_count(), count);
-    leading.gathered = gather(root.asDiagonal() * leading.vectors);
-    if (step == kLeadingSteps) break;
+    const bool last = step == kLeadingSteps;
+    leading.gathered =
+        gather_all(last ? form_factors_ : of_steps(), root.asDiagonal() * leading.vectors);
+    if (last) break;
     leading.vectors = leading.gathered;
   }
   const MatrixXf kept =
@@ -147,8 +156,7 @@ void SolvedTransfer::solve_leading(std::uint32_t matrix, Workspace& workspace) c
   r.noalias() -= leading.vectors * part;
 }
 
-void SolvedTransfer::solve(std::uint32_t matrix, const HierarchicalMatrix& form_factors,
-                           Workspace& workspace) const {
+void SolvedTransfer::solve(std::uint32_t matrix, Workspace& workspace) const {
   const Eigen::VectorXf& root = root_[matrix];
   Vectors &y = workspace.solution, &r = workspace.residual, &p = workspace.direction;
   Vectors &sent = workspace.sent, &arrived = workspace.arrived;
@@ -165,7 +173,7 @@ void SolvedTransfer::solve(std::uint32_t matrix, const HierarchicalMatrix& form_
   Sums rr = squares(r);
   for (int step = 0; (rr > allowed).any(); ++step) {
     if (step == kMostSteps) refuse();
-    form_factors.multiply(0, sent, arrived, workspace.products);
+    of_steps().multiply(0, sent, arrived, workspace.products);
     const Sums pq = column_sums(rows, width, [&](Index i) {
       return p.row(i).array().square() - sent.row(i).array() * arrived.row(i).array();
     });
@@ -188,7 +196,7 @@ void SolvedTransfer::solve(std::uint32_t matrix, const HierarchicalMatrix& form_
 const Vectors& SolvedTransfer::later_bounces(std::uint32_t matrix, const Vectors& x,
                                              Workspace& workspace) const {
   form_factors_.multiply(0, x, workspace.first, workspace.products);
-  solve(matrix, coarse_ ? *coarse_ : form_factors_, workspace);
+  solve(matrix, workspace);
   return workspace.solution;
 }
 
@@ -208,7 +216,7 @@ MatrixXf SolvedTransfer::multiply(std::uint32_t matrix, const MatrixXf& x) const
     }
     form_factors_.multiply(0, in, workspace.first, workspace.products);
     try {
-      solve(matrix, form_factors_, workspace);
+      solve(matrix, workspace);
     } catch (...) {
 #pragma omp critical
       failure = std::current_exception();

@@ -82,18 +82,20 @@ class SolvedTransfer {
     Eigen::LLT<Eigen::MatrixXd> system;  ///< of V^T (I - R G R) V
   };
 
-  Leading find_leading(const Eigen::VectorXf& root) const;
+  SolvedTransfer(const HierarchicalOperator& form_factors, std::optional<HierarchicalMatrix> coarse,
+                 const PatchTable& patches, double residual);
 
-  /// G x, by position; threads share the columns.
-  Vectors gather(const Vectors& x) const;
+  /// What steps multiply with.
+  const HierarchicalMatrix& of_steps() const { return coarse_ ? *coarse_ : form_factors_; }
+
+  Leading find_leading(const Eigen::VectorXf& root) const;
 
   /// Adds the part of the solution in the leading eigenvectors, and updates the residual of z.
   void solve_leading(std::uint32_t matrix, Workspace& workspace) const;
 
   /// From the first bounce G b in `workspace`, finds the later ones, (Yhat - G) b: the solution
-  /// there. The steps multiply with `form_factors`.
-  void solve(std::uint32_t matrix, const HierarchicalMatrix& form_factors,
-             Workspace& workspace) const;
+  /// there.
+  void solve(std::uint32_t matrix, Workspace& workspace) const;
 
   HierarchicalMatrix form_factors_;
   std::optional<HierarchicalMatrix> coarse_;

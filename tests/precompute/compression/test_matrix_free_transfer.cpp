@@ -49,6 +49,9 @@ struct Room {
     patches = model.patches;
     training = lights_in(patches, 16, 1);
     validation = lights_in(patches, 12, 2);
+    constexpr double kExactMultiplier = 1e-16;
+    form_factors = std::make_shared<const HierarchicalOperator>(compress_matrix(
+        FormFactorMatrix(exchange, patches.area), patches, training, kExactMultiplier));
   }
 
   PatchTable patches;
@@ -59,13 +62,10 @@ struct Room {
   FittingLights lights() const { return {training, validation}; }
 };
 
-/// With the dense inverse, and with blocks of low rank in the form factors.
+/// With the dense inverse.
 struct ColouredRoom : Room {
   ColouredRoom() : Room({0.7F, 0.5F, 0.2F}, 700) {
-    constexpr double kExactMultiplier = 1e-16;
     dense = build_dense_transfer(exchange, patches, Precision::kF32);
-    form_factors = std::make_shared<const HierarchicalOperator>(compress_matrix(
-        FormFactorMatrix(exchange, patches.area), patches, training, kExactMultiplier));
   }
 
   std::shared_ptr<const DenseOperator> dense;
@@ -73,9 +73,7 @@ struct ColouredRoom : Room {
 
 /// One matrix, and so the quicker.
 struct GreyRoom : Room {
-  explicit GreyRoom(std::size_t patch_count) : Room({0.6F, 0.6F, 0.6F}, patch_count) {
-    form_factors = test::dense_blocks(exchange, patches.area);
-  }
+  explicit GreyRoom(std::size_t patch_count) : Room({0.6F, 0.6F, 0.6F}, patch_count) {}
 };
 
 const ColouredRoom& coloured_room() {
@@ -202,7 +200,20 @@ TEST(SolvedTransfer, ErrorsOfTheStepsAreThoseOfTheRestThatTheyFind) {
       EXPECT_LT(error, off / 20);
       EXPECT_GT(error, 2e-5);
     }
+    const Eigen::MatrixXf truth = DenseMatrix(*room.dense).multiply(1, x);
+    EXPECT_LT((solved.multiply(1, x) - truth).norm(), off / 20 * truth.norm());
+    const Eigen::MatrixXf even = x.cwiseAbs();
+    const Eigen::MatrixXf of_even = DenseMatrix(*room.dense).multiply(1, even);
+    EXPECT_LT((solved.multiply(1, even) - of_even).norm(), off / 20 * of_even.norm());
   }
+}
+
+TEST(SolvedTransfer, RefusesCoarseFormFactorsInAnotherOrder) {
+  const ColouredRoom& room = coloured_room();
+  const auto other = test::dense_blocks(room.exchange, room.patches.area);
+  test::expect_error(
+      [&] { SolvedTransfer(*room.form_factors, other->storage(), room.patches, 1e-3); },
+      "another order");
 }
 
 TEST(SolvedTransfer, ProductsAreThoseOfTheDenseInverse) {
@@ -250,7 +261,7 @@ TEST(MatrixFreeTransfer, KeepsTheToleranceAsCompressionOfTheDenseInverseDoes) {
   EXPECT_LT(static_cast<double>(large->bytes()), 1.1 * static_cast<double>(by_dense->bytes()));
 }
 
-TEST(MatrixFreeTransfer, IsCompressedAgainFinerFromTheSameColumns) {
+TEST(MatrixFreeTransfer, IsCompressedAgainFinerFromTheSameBases) {
   const GreyRoom& room = small_room();
   const MatrixFreeTransfer columns(*room.form_factors, room.patches, room.lights(),
                                    {.compression = kCoarse});

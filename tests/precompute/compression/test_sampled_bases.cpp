@@ -45,7 +45,7 @@ struct Sampled {
 
   void solve() {
     const BlockCheckpoint none;
-    CouplingSolver solver(room().solved, bases, std::vector<bool>(cells.size(), true), 2, none);
+    CouplingSolver solver(room().solved, bases, {frame, cells}, 2, none);
     matrix.set_entries(bases, solver.run({}));
   }
 
