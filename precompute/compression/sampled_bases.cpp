@@ -8,7 +8,6 @@
 #include <span>
 
 #include "precompute/base/blas.h"
-#include "precompute/base/parallel_progress.h"
 #include "precompute/base/random_signs.h"
 #include "precompute/base/ranks.h"
 

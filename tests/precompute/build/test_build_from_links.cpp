@@ -197,14 +197,14 @@ TEST(BuildFromLinks, TheFileIsTheSameForAnyThreadsAnyMemoryAndWithACheckpoint) {
   omp_set_num_threads(threads + 3);
   // Not enough for all threads.
   settings.memory_limit_bytes = least_memory(settings) * 3 / 2;
-  settings.checkpoint = folder / "panels";
+  settings.checkpoint = folder / "parts";
   const Built limited = build(kBareRoom, settings);
   omp_set_num_threads(threads);
   EXPECT_LE(limited.report.estimate_after_links->peak_bytes, settings.memory_limit_bytes);
   save_transfer_file(folder / "other", limited.data);
   EXPECT_EQ(test::read_bytes(folder / "usual"), test::read_bytes(folder / "other"));
-  EXPECT_TRUE(std::filesystem::exists(folder / "panels" / "panel_0000"));
-  EXPECT_TRUE(std::filesystem::exists(folder / "panels" / "round_0_part_0000"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "parts" / "cell_0000"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "parts" / "round_0_part_0000"));
 }
 
 TEST(BuildFromLinks, SaysAgainWhatIsLeftWhenLinksAreKnown) {
