@@ -111,8 +111,8 @@ VectorXd background_light(const SymmetricMatrix& matrix, const ClusterTree& tree
   return background;
 }
 
-std::vector<ClusterWeight> make_cluster_weights(const ClusterTree& tree, const MatrixXd& sample,
-                                                const VectorXd& background,
+std::vector<ClusterWeight> make_cluster_weights(std::span<const Cluster> clusters,
+                                                const MatrixXd& sample, const VectorXd& background,
                                                 const PatchRoles& roles) {
   const MatrixXd relative = background.cwiseInverse().asDiagonal() * sample;
   // The minimum keeps the variance positive where lights give no indirect light.
@@ -121,17 +121,17 @@ std::vector<ClusterWeight> make_cluster_weights(const ClusterTree& tree, const M
   const double variance = std::max(kBackground * relative.squaredNorm() / positions,
                                    std::numeric_limits<double>::min());
   load_blas();
-  std::vector<Principal> principal(tree.clusters.size());
+  std::vector<Principal> principal(clusters.size());
 #pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t k = 0; k < tree.clusters.size(); ++k) {
-    const Cluster& cluster = tree.clusters[k];
+  for (std::size_t k = 0; k < clusters.size(); ++k) {
+    const Cluster& cluster = clusters[k];
     principal[k] = principal_directions(relative.middleRows(cluster.begin, cluster.count));
   }
   std::vector<ClusterWeight> weights;
   weights.reserve(principal.size());
   for (std::size_t k = 0; k < principal.size(); ++k) {
     VectorXd strength = (1 + principal[k].energies.array() / variance).sqrt() - 1;
-    weights.emplace_back(background.segment(tree.clusters[k].begin, tree.clusters[k].count),
+    weights.emplace_back(background.segment(clusters[k].begin, clusters[k].count),
                          std::move(principal[k].directions), std::move(strength));
   }
   return weights;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 #include <vector>
 
 #include "precompute/base/symmetric_matrix.h"
@@ -52,10 +53,10 @@ class ClusterWeight {
 /// sources.
 Eigen::VectorXd background_light(const SymmetricMatrix& matrix, const ClusterTree& tree);
 
-/// The weights of all clusters of `tree`. `sample` [positions][lights] holds a light in each
+/// The weights of some clusters of a tree. `sample` [positions][lights] holds a light in each
 /// column, in the coordinates of Yhat, at sources only, scaled so that all lights count alike;
 /// `background` comes from background_light.
-std::vector<ClusterWeight> make_cluster_weights(const ClusterTree& tree,
+std::vector<ClusterWeight> make_cluster_weights(std::span<const Cluster> clusters,
                                                 const Eigen::MatrixXd& sample,
                                                 const Eigen::VectorXd& background,
                                                 const PatchRoles& roles = {});

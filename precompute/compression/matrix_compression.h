@@ -35,7 +35,7 @@ struct CompressionFrame {
   std::vector<std::int8_t> balance();
 
   std::vector<ClusterWeight> weights() const {
-    return make_cluster_weights(tree, sample, background, roles);
+    return make_cluster_weights(tree.clusters, sample, background, roles);
   }
 };
 

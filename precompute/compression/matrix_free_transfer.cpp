@@ -102,9 +102,8 @@ MatrixFreeTransfer::MatrixFreeTransfer(const HierarchicalOperator& form_factors,
   report_progress(progress, kVectorsBefore / usual);
   const CompressionFrame frame = compression_frame(state.matrix, patches, lights.training);
   const std::vector<std::uint32_t> cells = clusters_up_to(frame.tree, kBasisCell);
-  SharedBases bases =
-      sample_bases(state.solved, frame, frame.weights(), cells, kBasisPart * state.tolerance(),
-                   part_of(progress, kVectorsBefore / usual, kBefore / usual));
+  SharedBases bases = sample_bases(state.solved, frame, cells, kBasisPart * state.tolerance(),
+                                   part_of(progress, kVectorsBefore / usual, kBefore / usual));
   CouplingSolver solver(state.solved, bases, {frame, cells}, state.plan.cell_count, checkpoint);
   const double begin = kBefore / usual, all = kBefore + solver.work() + kVectorsOfRounds;
   state.solving_part = std::max(begin, (kBefore + solver.work()) / all);

@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "precompute/base/progress.h"
-#include "precompute/compression/light_weights.h"
 #include "precompute/compression/matrix_compression.h"
 #include "precompute/inverse/shared_bases.h"
 #include "precompute/inverse/solved_transfer.h"
@@ -13,9 +12,6 @@ namespace rebounce {
 
 /// Positions in a cell of the bases.
 inline constexpr std::uint32_t kBasisCell = 512;  // lab/108: larger ones gain little
-
-/// The vectors that are solved for to find bases, for each matrix, at the least.
-inline constexpr Eigen::Index kLeastSamples = 512;
 
 /// Bases for Z = Yhat - G, the light of all bounces but the first, over `cells` of the tree of
 /// `frame`, found from the light that random vectors send (N. Halko, P. G. Martinsson and J. A.
@@ -30,7 +26,6 @@ inline constexpr Eigen::Index kLeastSamples = 512;
 /// they are three times the usual rank. The bits do not depend on the number of threads. Throws
 /// Cancelled if asked to stop.
 SharedBases sample_bases(const SolvedTransfer& solved, const CompressionFrame& frame,
-                         const std::vector<ClusterWeight>& weights,
                          const std::vector<std::uint32_t>& cells, double tolerance,
                          const Progress& progress = {});
 

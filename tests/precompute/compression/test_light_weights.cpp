@@ -85,7 +85,8 @@ TEST(BackgroundLight, IsOneWhereNoLightArrivesAnywhere) {
 struct Weighted {
   VectorXd background = VectorXd::LinSpaced(32, 1, 4);
   MatrixXd lights = random_matrix(32, 4);
-  ClusterWeight weight = make_cluster_weights(reversed_cluster(32), lights, background).front();
+  ClusterWeight weight =
+      make_cluster_weights(reversed_cluster(32).clusters, lights, background).front();
 
   MatrixXd matrix() const {
     MatrixXd w = MatrixXd::Identity(32, 32);

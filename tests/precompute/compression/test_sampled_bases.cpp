@@ -41,7 +41,7 @@ struct Sampled {
       : matrix(room().solved, room().solved.estimated_energies(roles), roles),
         frame(compression_frame(matrix, room().patches, room().training)),
         cells(clusters_up_to(frame.tree, kBasisCell)),
-        bases(sample_bases(room().solved, frame, frame.weights(), cells, tolerance)) {}
+        bases(sample_bases(room().solved, frame, cells, tolerance)) {}
 
   void solve() {
     const BlockCheckpoint none;
