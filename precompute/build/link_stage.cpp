@@ -2,12 +2,12 @@
 #include <cmath>
 #include <utility>
 
+#include "precompute/base/process_memory.h"
 #include "precompute/base/ranks.h"
 #include "precompute/build/build_estimate.h"
 #include "precompute/build/exchange_stage.h"
 #include "precompute/build/operator_stage.h"
 #include "precompute/exchange/links/links.h"
-#include "precompute/exchange/links/refined_links.h"
 #include "precompute/lights/link_error.h"
 
 namespace rebounce {
@@ -58,33 +58,33 @@ double finer_epsilon(double epsilon, double error, double tolerance) {
   return epsilon * std::clamp(wanted, kLeastStep, kMostStep);
 }
 
-/// True if as many links as epsilon times `step` gives fit into the memory limit.
+/// True if as many links as epsilon times `step` gives fit into the memory limit, where `builder`
+/// has made `link_count` and nothing else holds them.
 bool finer_fit(const PatchModel& model, const PatchRoles& roles, const BuildSettings& decided,
-               std::size_t link_count, double step) {
+               const LinkBuilder& builder, std::size_t link_count, double step) {
   const double finer = static_cast<double>(link_count) * std::pow(step, -kCountPower);
   LinkedBuild build =
       linked_build(built_scene(model.patches.size(), model.mesh), link_count,
                    model.patches.reflectance, roles, kCompressionPart * decided.tolerance);
   build.link_count = static_cast<std::size_t>(finer);
+  build.held_bytes -= std::min(build.held_bytes, builder.held_bytes());
   const std::uint64_t limit = decided.memory_limit_bytes;
   return std::max(peak_bytes_of_links(build), peak_bytes_after_links(build, limit)) <= limit;
 }
 
-}  // namespace
-
-EscapedLight find_links(PatchModel& model, const RayTracer& tracer, const PatchRoles& roles,
-                        bool judged, BuildSettings& decided, TransferData& data,
-                        BuildReport& report, PhaseClock& clock) {
+/// Makes links, and while they are `judged`, finer ones from them until they are near enough. The
+/// last are in the data.
+LinkBuild near_enough_links(PatchModel& model, const RayTracer& tracer, const PatchRoles& roles,
+                            bool judged, BuildSettings& decided, TransferData& data,
+                            BuildReport& report, PhaseClock& clock) {
   double& epsilon = decided.form_factors.link_epsilon;
-  report.ray_count = report.pair_count = 0;
+  LinkBuilder builder(model, tracer, decided.form_factors);
   double last_error = 0;
   for (int round = 1;; ++round) {
-    LinkBuild build =
-        clock.run(round == 1 ? "form factors" : "finer links", [&](const Progress& part) {
-          return build_links(model, tracer, decided.form_factors, {}, part);
-        });
-    report.ray_count += build.ray_count;
-    report.pair_count += build.candidate_count;
+    LinkBuild build = clock.run(round == 1 ? "form factors" : "finer links",
+                                [&](const Progress& part) { return builder.build(epsilon, part); });
+    report.ray_count = build.ray_count;
+    report.pair_count = build.candidate_count;
     report.link_count = build.links.pair.size();
     report.closure = build.closure;
     data.links = std::move(build.links);
@@ -98,12 +98,22 @@ EscapedLight find_links(PatchModel& model, const RayTracer& tracer, const PatchR
     if (error <= kAccepted * decided.tolerance || !helps) return build;
     const double finer = finer_epsilon(epsilon, error, decided.tolerance);
     // Ranks may have different limits, and go the same way.
-    const bool fits = finer_fit(model, roles, decided, report.link_count, finer / epsilon);
+    const bool fits = finer_fit(model, roles, decided, builder, report.link_count, finer / epsilon);
     if (Ranks().least(fits ? 1 : 0) == 0) return build;
     epsilon = finer;
     last_error = error;
     data.links = {};
   }
+}
+
+}  // namespace
+
+EscapedLight find_links(PatchModel& model, const RayTracer& tracer, const PatchRoles& roles,
+                        bool judged, BuildSettings& decided, TransferData& data,
+                        BuildReport& report, PhaseClock& clock) {
+  LinkBuild build = near_enough_links(model, tracer, roles, judged, decided, data, report, clock);
+  return_freed_memory();  // of what finer links would have been made from
+  return build;
 }
 
 std::size_t forecast_links(const PatchModel& model, const RayTracer& tracer,

@@ -15,50 +15,52 @@ struct LeafLinks::Scratch {
   PairExchange::Scratch pairs;
 };
 
-LeafLinks::LeafLinks(const LinkTree& tree, std::span<Link> links)
-    : links_(links), begin_(tree.patches().size() + 1, 0), involved_(tree.patches().size(), 0) {
+LeafLinks::LeafLinks(const LinkTree& tree, const PatchGeometry& geometry, std::span<Link> links)
+    : geometry_(geometry), links_(links), begin_(tree.patches().size() + 1, 0) {
   for (std::size_t l = 0; l < links.size(); ++l) {
     const LinkNode &a = tree[links[l].a], &b = tree[links[l].b];
     if (!a.is_leaf() || !b.is_leaf()) continue;
     const auto [row, column] = std::minmax({tree.leaf_patch(a), tree.leaf_patch(b)});
+    if (links[l].measured_area >= 0 && !is_coarse_pair(geometry, row, column)) continue;
     pairs_.push_back({row, column, l});
     ++begin_[row + 1];
-    involved_[row] = involved_[column] = 1;
   }
   std::ranges::sort(pairs_, {}, [](const Pair& pair) { return std::tie(pair.row, pair.column); });
   for (std::size_t i = 1; i < begin_.size(); ++i) begin_[i] += begin_[i - 1];
-  count_.resize(pairs_.size(), 0);
 }
 
-std::vector<double> LeafLinks::counted_variance(const PatchGeometry& geometry,
-                                                const CountedExchange& counted) const {
-  std::vector<double> sum(involved_.size(), 0.0);
+void LeafLinks::count(const HemisphereCounts& hemispheres) {
+  count_.assign(pairs_.size(), 0);
+  hemispheres.for_each_patch([&](std::uint32_t i, std::span<const MetPatch> met) {
+    for (const MetPatch& m : met) {
+      const auto [from, to] = std::minmax({i, m.patch});
+      const auto pairs = row(from);
+      const auto found = std::ranges::lower_bound(pairs, to, {}, &Pair::column);
+      if (found == pairs.end() || found->column != to) continue;
+      const auto k = static_cast<std::size_t>(&*found - pairs_.data());
+      // Rays of a patch to itself count for both sides.
+      std::atomic_ref(count_[k]).fetch_add(from == to ? 2 * m.count : m.count,
+                                           std::memory_order_relaxed);
+    }
+  });
+  Ranks().add_up(std::span(count_));
+}
+
+std::vector<double> LeafLinks::counted_variance(const CountedExchange& counted) const {
+  std::vector<double> sum(begin_.size() - 1, 0.0);
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
     const std::uint32_t i = pairs_[k].row, j = pairs_[k].column;
-    if (!is_coarse_pair(geometry, i, j)) continue;
+    if (!is_coarse_pair(geometry_, i, j)) continue;
     const double found = counted.exchange(i, j, count_[k]);
-    const double variance = counted.variance(i, j, found) / (geometry.area(i) * geometry.area(j));
+    const double variance = counted.variance(i, j, found) / (geometry_.area(i) * geometry_.area(j));
     sum[i] += variance;
     sum[j] += variance;
   }
   return sum;
 }
 
-void LeafLinks::count(std::uint32_t i, std::span<const MetPatch> met) {
-  for (const MetPatch& m : met) {
-    const auto [from, to] = std::minmax({i, m.patch});
-    const auto pairs = row(from);
-    const auto found = std::ranges::lower_bound(pairs, to, {}, &Pair::column);
-    if (found == pairs.end() || found->column != to) continue;
-    const auto k = static_cast<std::size_t>(&*found - pairs_.data());
-    // Rays of a patch to itself count for both sides.
-    std::atomic_ref(count_[k]).fetch_add(from == to ? 2 * m.count : m.count,
-                                         std::memory_order_relaxed);
-  }
-}
-
-std::uint64_t LeafLinks::measure(const PatchGeometry& geometry, const PairExchange& exchange,
-                                 int probe_rays, const Progress& progress) {
+std::uint64_t LeafLinks::measure(const PairExchange& exchange, int probe_rays,
+                                 const Progress& progress) {
   const Ranks ranks;
   const std::size_t rows = begin_.size() - 1;
   ParallelProgress loop(progress, rows);
@@ -69,7 +71,7 @@ std::uint64_t LeafLinks::measure(const PatchGeometry& geometry, const PairExchan
 #pragma omp for schedule(dynamic, 4)
     for (std::size_t i = 0; i < rows; ++i) {
       if (loop.stopped() || !ranks.makes(i)) continue;
-      measure_row(static_cast<std::uint32_t>(i), geometry, exchange, probe_rays, scratch);
+      measure_row(static_cast<std::uint32_t>(i), exchange, probe_rays, scratch);
       loop.advance();
     }
     rays += scratch.pairs.ray_count;
@@ -92,27 +94,20 @@ void LeafLinks::share_measured(const Ranks& ranks) {
   for (std::uint32_t i = 0; i < by_row.size(); ++i) {
     auto next = by_row[i].begin();
     for (const Pair& pair : row(i)) {
-      links_[pair.link].exchange_area = (*next)[0];
-      links_[pair.link].variance = (*next++)[1];
+      Link& link = links_[pair.link];
+      link.exchange_area = link.measured_area = (*next)[0];
+      link.variance = (*next++)[1];
     }
   }
 }
 
-void LeafLinks::add_up_counts(const Ranks& ranks) {
-  if (ranks.alone()) return;
-  added_up_.resize(count_.size(), 0);
-  for (std::size_t k = 0; k < count_.size(); ++k) count_[k] -= added_up_[k];
-  ranks.add_up(std::span(count_));
-  for (std::size_t k = 0; k < count_.size(); ++k) added_up_[k] = count_[k] += added_up_[k];
-}
-
-void LeafLinks::measure_row(std::uint32_t i, const PatchGeometry& geometry,
-                            const PairExchange& exchange, int probe_rays, Scratch& scratch) {
+void LeafLinks::measure_row(std::uint32_t i, const PairExchange& exchange, int probe_rays,
+                            Scratch& scratch) {
   scratch.facing.clear();
   scratch.entries.clear();
   for (const Pair& pair : row(i)) {
     const std::uint32_t count = count_[static_cast<std::size_t>(&pair - pairs_.data())];
-    if (is_coarse_pair(geometry, i, pair.column)) {
+    if (is_coarse_pair(geometry_, i, pair.column)) {
       exchange.count_coarse(i, pair.column, count, scratch.entries);
     } else {
       scratch.facing.push_back({pair.column, links_[pair.link].unoccluded_area, count});
@@ -124,7 +119,7 @@ void LeafLinks::measure_row(std::uint32_t i, const PatchGeometry& geometry,
   for (const Pair& pair : row(i)) {
     const bool exchanges = entry != scratch.entries.end() && entry->column == pair.column;
     Link& link = links_[pair.link];
-    link.exchange_area = exchanges ? entry->exchange_area : 0;
+    link.exchange_area = link.measured_area = exchanges ? entry->exchange_area : 0;
     link.variance = exchanges ? static_cast<float>(entry->variance()) : 0;
     if (exchanges) ++entry;
   }

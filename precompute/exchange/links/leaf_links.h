@@ -6,6 +6,7 @@
 
 #include "precompute/base/progress.h"
 #include "precompute/base/ranks.h"
+#include "precompute/exchange/links/hemisphere_counts.h"
 #include "precompute/exchange/links/link_refinement.h"
 #include "precompute/exchange/links/link_tree.h"
 #include "precompute/exchange/pairs/hemisphere_exchange.h"
@@ -18,30 +19,21 @@ namespace rebounce {
 /// (lab/117).
 class LeafLinks {
  public:
-  /// Finds those of `links`, which must outlive the object.
-  LeafLinks(const LinkTree& tree, std::span<Link> links);
+  /// Finds those of `links` that are still to be measured, and those of near pairs of many
+  /// triangles, of which hemisphere rays alone tell ("coarse"). All arguments must outlive the
+  /// object.
+  LeafLinks(const LinkTree& tree, const PatchGeometry& geometry, std::span<Link> links);
 
-  bool empty() const { return pairs_.empty(); }
+  /// Counts the hemisphere rays that join the patches of each link.
+  void count(const HemisphereCounts& hemispheres);
 
-  /// True for a patch with one of the links.
-  bool involves(std::uint32_t patch) const { return involved_[patch] != 0; }
+  /// The variance of coarse links, as counted: for each patch [n] that of its entries of
+  /// A^1/2 F A^-1/2, added up.
+  std::vector<double> counted_variance(const CountedExchange& counted) const;
 
-  /// The variance of coarse links, of which hemisphere rays alone tell, as counted so far: for each
-  /// patch [n] that of its entries of A^1/2 F A^-1/2, added up.
-  std::vector<double> counted_variance(const PatchGeometry& geometry,
-                                       const CountedExchange& counted) const;
-
-  /// Counts what the hemisphere rays of patch i met, ascending. Several threads may count at once.
-  void count(std::uint32_t i, std::span<const MetPatch> met);
-
-  /// Adds up what the ranks have counted since it was called last.
-  void add_up_counts(const Ranks& ranks);
-
-  /// Writes the exchange areas to the links, once all patches are counted. Each pair gets
-  /// `probe_rays` at first. Returns the number of rays. Throws Cancelled if `progress` asks to
-  /// stop.
-  std::uint64_t measure(const PatchGeometry& geometry, const PairExchange& exchange, int probe_rays,
-                        const Progress& progress);
+  /// Writes the exchange areas to the links, once rays are counted. Each pair gets `probe_rays` at
+  /// first. Returns the number of rays. Throws Cancelled if `progress` asks to stop.
+  std::uint64_t measure(const PairExchange& exchange, int probe_rays, const Progress& progress);
 
  private:
   struct Pair {
@@ -53,16 +45,14 @@ class LeafLinks {
   std::span<const Pair> row(std::uint32_t i) const {
     return std::span(pairs_).subspan(begin_[i], begin_[i + 1] - begin_[i]);
   }
-  void measure_row(std::uint32_t i, const PatchGeometry& geometry, const PairExchange& exchange,
-                   int probe_rays, Scratch& scratch);
+  void measure_row(std::uint32_t i, const PairExchange& exchange, int probe_rays, Scratch& scratch);
   void share_measured(const Ranks& ranks);
 
+  const PatchGeometry& geometry_;
   std::span<Link> links_;
-  std::vector<Pair> pairs_;              ///< ascending by row and column
-  std::vector<std::size_t> begin_;       ///< [n + 1] first pair of each row
-  std::vector<std::uint8_t> involved_;   ///< [n]
-  std::vector<std::uint32_t> count_;     ///< hemisphere rays of each pair, from either side
-  std::vector<std::uint32_t> added_up_;  ///< what all ranks have counted, where there are several
+  std::vector<Pair> pairs_;           ///< ascending by row and column
+  std::vector<std::size_t> begin_;    ///< [n + 1] first pair of each row
+  std::vector<std::uint32_t> count_;  ///< hemisphere rays of each pair, from either side
 };
 
 }  // namespace rebounce

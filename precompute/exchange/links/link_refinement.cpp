@@ -9,6 +9,7 @@
 #include "precompute/base/ranks.h"
 #include "rebounce/error.h"
 #include "runtime/rays/float3_glm.h"
+#include "transfer/base/bfloat16.h"
 
 namespace rebounce {
 namespace {
@@ -22,6 +23,14 @@ constexpr std::size_t kPairsInTurn = 64;
 // A pair that faces in part may get a link if all of it is below this fraction of the allowed
 // error.
 constexpr double kNegligible = 0.1;
+
+/// A gradient in the precision that LinkedFormFactors stores, so that everything that is made from
+/// the links uses the same F.
+Float3 stored_gradient(const glm::dvec3& gradient) {
+  Float3 stored = to_float3(gradient);
+  for (float& g : stored) g = round_to_bfloat16(g);
+  return stored;
+}
 
 bool is_plane(const LinkNode& node) {
   return node.is_flat() && node.highest - node.lowest <= kPlane * node.radius;
@@ -42,34 +51,63 @@ LinkRefinement::LinkRefinement(const LinkTree& tree, const ShadowRays& shadow_ra
       settings_(settings),
       rays_(tree, shadow_rays, tracer, settings.seed) {}
 
-void LinkRefinement::run(const Progress& progress) {
-  links_.clear();
-  done_ = 0;
-  refine({{0, 0, View::kUnknown}}, progress);
-}
-
-std::size_t LinkRefinement::revise(const std::vector<bool>& doubtful, const Progress& progress) {
-  const auto nodes = tree_.nodes();
-  doubtful_.assign(nodes.size(), 0);
-  for (std::size_t k = nodes.size(); k-- > 0;) {
-    const LinkNode& node = nodes[k];
-    doubtful_[k] = node.is_leaf() ? doubtful[tree_.leaf_patch(node)]
-                                  : doubtful_[node.first_child] | doubtful_[node.first_child + 1];
-  }
-  std::vector<Candidate> again;
+/// Takes out the links for which `again`(link) is true, as candidates.
+template <typename Again>
+std::vector<LinkRefinement::Candidate> LinkRefinement::take(const Again& again) {
+  std::vector<Candidate> taken;
   std::erase_if(links_, [&](const Link& link) {
-    if (!is_doubtful(link.a) && !is_doubtful(link.b)) return false;
-    again.push_back({link.a, link.b, View::kUnknown});
-    done_ -= (link.a == link.b ? 1 : 2) * tree_[link.a].area * tree_[link.b].area /
-             (tree_[0].area * tree_[0].area);
+    if (!again(link)) return false;
+    taken.push_back({link.a, link.b, link.view});
+    done_ -= part_of_pairs(taken.back());
     return true;
   });
-  const std::size_t kept = links_.size();
-  refine(std::move(again), progress);
-  return kept;
+  return taken;
 }
 
-double LinkRefinement::forecast(std::size_t sample, const Progress& progress) {
+void LinkRefinement::refine(double epsilon, const Progress& progress) {
+  const bool first = epsilon_ == 0;
+  epsilon_ = epsilon;
+  std::erase_if(links_, [](const Link& link) { return link.added; });
+  if (first) return refine(std::vector<Candidate>{{0, 0, View::kUnknown}}, progress);
+  std::vector<Candidate> again =
+      take([&](const Link& link) { return link.least_epsilon >= epsilon; });
+  for (const Candidate& pair : empty_) done_ -= part_of_pairs(pair);
+  again.insert(again.end(), empty_.begin(), empty_.end());
+  empty_.clear();
+  refine(std::move(again), progress);
+}
+
+/// [nodes] nonzero for nodes that hold one of the `patches` [n].
+std::vector<std::uint8_t> LinkRefinement::nodes_with(const std::vector<bool>& patches) const {
+  const auto nodes = tree_.nodes();
+  std::vector<std::uint8_t> with(nodes.size());
+  for (std::size_t k = nodes.size(); k-- > 0;) {
+    const LinkNode& node = nodes[k];
+    with[k] = node.is_leaf() ? patches[tree_.leaf_patch(node)]
+                             : with[node.first_child] | with[node.first_child + 1];
+  }
+  return with;
+}
+
+void LinkRefinement::revise(const std::vector<bool>& doubtful, const Progress& progress) {
+  std::vector<std::uint8_t> with = nodes_with(doubtful);
+  std::vector<bool> is_new = doubtful;
+  for (std::uint32_t k = 0; k < doubtful_.size(); ++k) {
+    const LinkNode& node = tree_[k];
+    if (node.is_leaf() && doubtful_[k] != 0) is_new[tree_.leaf_patch(node)] = false;
+  }
+  const std::vector<std::uint8_t> with_new = nodes_with(is_new);
+  doubtful_.resize(with.size(), 0);
+  for (std::size_t k = 0; k < with.size(); ++k) doubtful_[k] |= with[k];
+  refine(take([&](const Link& link) {
+           const bool leaves = tree_[link.a].is_leaf() && tree_[link.b].is_leaf();
+           return !leaves && (with_new[link.a] != 0 || with_new[link.b] != 0);
+         }),
+         progress);
+}
+
+double LinkRefinement::forecast(double epsilon, std::size_t sample, const Progress& progress) {
+  epsilon_ = epsilon;
   double count = 0, weight = 1;
   std::vector<Candidate> generation{{0, 0, View::kUnknown}};
   std::vector<Outcome> outcomes;
@@ -100,12 +138,14 @@ double LinkRefinement::forecast(std::size_t sample, const Progress& progress) {
   return count;
 }
 
-std::size_t LinkRefinement::add(std::span<const std::pair<std::uint32_t, std::uint32_t>> leaves) {
+void LinkRefinement::add(std::span<const std::pair<std::uint32_t, std::uint32_t>> leaves) {
   std::vector<Candidate> candidates;
   for (const auto& [a, b] : leaves) candidates.push_back({a, b, View::kUnknown});
-  const std::size_t kept = links_.size();
+  const std::size_t known = links_.size();
+  const double done = done_;  // with the hidden links that these pairs are in
   refine(std::move(candidates), {});
-  return kept;
+  done_ = done;
+  for (Link& link : links().subspan(known)) link.added = true;
 }
 
 void LinkRefinement::refine(std::vector<Candidate> generation, const Progress& progress) {
@@ -173,20 +213,27 @@ bool LinkRefinement::needs_all_rays(const Candidate& pair) const {
   return pair.view == View::kMixed || is_doubtful(pair.a) || is_doubtful(pair.b);
 }
 
-double LinkRefinement::allowed_squared(const LinkNode& a, const LinkNode& b) const {
-  const double weight_squared = 0.5 * (a.weight * a.weight + b.weight * b.weight);
-  return settings_.link_epsilon * settings_.link_epsilon / weight_squared;
+/// The mean over both nodes of the squared weight of errors.
+double LinkRefinement::weight_squared(const Candidate& pair) const {
+  const double a = tree_[pair.a].weight, b = tree_[pair.b].weight;
+  return 0.5 * (a * a + b * b);
+}
+
+double LinkRefinement::allowed_squared(const Candidate& pair) const {
+  return epsilon_ * epsilon_ / weight_squared(pair);
 }
 
 LinkRefinement::Outcome LinkRefinement::link_nodes(const Candidate& pair, Scratch& scratch) const {
-  const LinkNode &a = tree_[pair.a], &b = tree_[pair.b];
-  const double allowed = allowed_squared(a, b);
-  const bool smooth = scratch.kernel.residual_squared() < allowed &&
-                      !(scratch.kernel.faces_in_part() &&
-                        scratch.kernel.norm_squared() > kNegligible * kNegligible * allowed);
-  if (smooth && scratch.kernel.unoccluded() == 0) return {};
+  const PairKernel& kernel = scratch.kernel;
+  const double allowed = allowed_squared(pair);
+  const double least =
+      kernel.faces_in_part()
+          ? std::max(kernel.residual_squared(), kernel.norm_squared() / (kNegligible * kNegligible))
+          : kernel.residual_squared();
+  const bool smooth = least < allowed;
+  if (smooth && kernel.unoccluded() == 0) return make_link(pair, kernel, {}, least);
   // If k rays agree, a fraction of about 1 / (k + 2) may not: rule of succession.
-  const double enough = std::sqrt(scratch.kernel.norm_squared() / allowed) - 2;
+  const double enough = std::sqrt(kernel.norm_squared() / allowed) - 2;
   if (!(enough < LinkRays::kMostRays) || (!smooth && pair.view == View::kClear))
     return split(pair, pair.view);
   int count = needs_all_rays(pair) ? settings_.full_rays : settings_.probe_rays;
@@ -195,18 +242,21 @@ LinkRefinement::Outcome LinkRefinement::link_nodes(const Candidate& pair, Scratc
 
   LinkRays::Visibility visible = rays_.trace(pair.a, pair.b, count, scratch.rays);
   scratch.ray_count += count;
-  if (!visible.mixed && visible.part == 0) return make_link(pair, scratch.kernel, visible);
+  const auto for_rays = [&] { return kernel.norm_squared() / ((count + 2.0) * (count + 2.0)); };
+  if (!visible.mixed && visible.part == 0) return make_link(pair, kernel, visible, for_rays());
   if (!smooth) return split(pair, visible.mixed ? View::kMixed : View::kClear);
-  if (!visible.mixed) return make_link(pair, scratch.kernel, visible);
+  if (!visible.mixed) return make_link(pair, kernel, visible, std::max(least, for_rays()));
   if (count < settings_.full_rays) {
-    visible = rays_.trace(pair.a, pair.b, settings_.full_rays, scratch.rays);
-    scratch.ray_count += settings_.full_rays;
+    count = settings_.full_rays;
+    visible = rays_.trace(pair.a, pair.b, count, scratch.rays);
+    scratch.ray_count += count;
   }
-  return link_mixed(pair, scratch.kernel, visible);
+  return link_mixed(pair, kernel, visible, std::max(least, for_rays()));
 }
 
 LinkRefinement::Outcome LinkRefinement::link_mixed(const Candidate& pair, const PairKernel& kernel,
-                                                   const LinkRays::Visibility& visible) const {
+                                                   const LinkRays::Visibility& visible,
+                                                   double least_squared) const {
   const LinkNode &a = tree_[pair.a], &b = tree_[pair.b];
   if (is_doubtful(pair.a) && !a.is_leaf()) return {Outcome::Kind::kSplitA, View::kMixed, {}};
   if (is_doubtful(pair.b) && !b.is_leaf()) return {Outcome::Kind::kSplitB, View::kMixed, {}};
@@ -214,22 +264,27 @@ LinkRefinement::Outcome LinkRefinement::link_mixed(const Candidate& pair, const 
                                visible.spread * kernel.norm_squared();
   // If some children see each other and others do not, a wall may be between them, and light would
   // leak through it.
-  if (visible.divided || !(error_squared < allowed_squared(a, b))) {
+  if (visible.divided || !(error_squared < allowed_squared(pair))) {
     return split(pair, View::kMixed);
   }
-  return make_link(pair, kernel, visible);
+  return make_link(pair, kernel, visible, std::max(least_squared, error_squared));
 }
 
+/// `least_squared`: what the allowed squared error has to be above for this link.
 LinkRefinement::Outcome LinkRefinement::make_link(const Candidate& pair, const PairKernel& kernel,
-                                                  const LinkRays::Visibility& visible) const {
-  return {.kind = Outcome::Kind::kLink,
-          .view = View::kUnknown,
-          .link = {.a = pair.a,
-                   .b = pair.b,
-                   .exchange_area = static_cast<float>(visible.part * kernel.unoccluded()),
-                   .unoccluded_area = static_cast<float>(kernel.unoccluded()),
-                   .gradient_a = to_float3(visible.part * kernel.gradient_a()),
-                   .gradient_b = to_float3(visible.part * kernel.gradient_b())}};
+                                                  const LinkRays::Visibility& visible,
+                                                  double least_squared) const {
+  return {
+      .kind = Outcome::Kind::kLink,
+      .view = View::kUnknown,
+      .link = {.a = pair.a,
+               .b = pair.b,
+               .exchange_area = static_cast<float>(visible.part * kernel.unoccluded()),
+               .unoccluded_area = static_cast<float>(kernel.unoccluded()),
+               .gradient_a = stored_gradient(visible.part * kernel.gradient_a()),
+               .gradient_b = stored_gradient(visible.part * kernel.gradient_b()),
+               .least_epsilon = static_cast<float>(std::sqrt(least_squared * weight_squared(pair))),
+               .view = pair.view}};
 }
 
 /// Splits the node that looks larger from the other: the distance is the same for both.
@@ -243,7 +298,6 @@ LinkRefinement::Outcome LinkRefinement::split(const Candidate& pair, View view) 
 std::vector<LinkRefinement::Candidate> LinkRefinement::merge(
     const std::vector<Candidate>& generation, const std::vector<Outcome>& outcomes) {
   std::vector<Candidate> next;
-  const double whole = tree_[0].area * tree_[0].area;
   for (std::size_t k = 0; k < generation.size(); ++k) {
     const Candidate& pair = generation[k];
     const Outcome& outcome = outcomes[k];
@@ -253,10 +307,18 @@ std::vector<LinkRefinement::Candidate> LinkRefinement::merge(
     }
     if (outcome.kind == Outcome::Kind::kLink && outcome.link.unoccluded_area > 0) {
       links_.push_back(outcome.link);
+    } else if (outcome.kind == Outcome::Kind::kLink) {
+      empty_.push_back(pair);
     }
-    done_ += (pair.a == pair.b ? 1 : 2) * tree_[pair.a].area * tree_[pair.b].area / whole;
+    done_ += part_of_pairs(pair);
   }
   return next;
+}
+
+/// The fraction of all pairs of points that a pair of nodes holds.
+double LinkRefinement::part_of_pairs(const Candidate& pair) const {
+  const double whole = tree_[0].area * tree_[0].area;
+  return (pair.a == pair.b ? 1 : 2) * tree_[pair.a].area * tree_[pair.b].area / whole;
 }
 
 void LinkRefinement::append_children(const Candidate& pair, const Outcome& outcome,

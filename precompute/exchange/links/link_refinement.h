@@ -24,6 +24,11 @@ struct Link {
   float unoccluded_area;          ///< m²: the exchange area with nothing between, the upper limit
   Float3 gradient_a, gradient_b;  ///< m
   float variance = 0;  ///< m⁴, of the exchange area of two patches; of nodes it is not known
+  float measured_area = -1;  ///< m²: that of two patches before closure; below 0: not measured
+  float least_epsilon = 0;   ///< the link is near enough where epsilon is above this
+  /// What the last rays between ancestors of the pair told.
+  enum class View : std::uint8_t { kUnknown, kClear, kMixed } view = View::kUnknown;
+  bool added = false;  ///< two patches that hemisphere rays join, in a hidden link of nodes
 };
 
 /// Hierarchical refinement (P. Hanrahan, D. Salzman and L. Aupperle, "A rapid hierarchical
@@ -40,6 +45,9 @@ struct Link {
 /// rays disagree get all rays, because few rays mostly miss the little light that passes a door.
 /// Links between two patches are left to be measured (leaf_links.h).
 ///
+/// Links that are near enough for a smaller epsilon too stay as they are when it falls: only the
+/// others are examined again.
+///
 /// Pairs are refined in generations. OpenMP threads share each generation; the bits do not depend
 /// on their number. Throws Cancelled if `progress` asks to stop.
 class LinkRefinement {
@@ -48,33 +56,34 @@ class LinkRefinement {
   LinkRefinement(const LinkTree& tree, const ShadowRays& shadow_rays, const RayTracer& tracer,
                  const FormFactorSettings& settings);
 
-  /// Refines from the root.
-  void run(const Progress& progress);
+  /// Refines from the root, and when called again from the links that are there, to an `epsilon`
+  /// that is smaller than the last. Drops the links that add() has added.
+  void refine(double epsilon, const Progress& progress);
 
-  /// Examines every link of a patch that is `doubtful` [n] again, with all rays. Where the rays
-  /// disagree, the link is split down to that patch. The links from the returned number on are new.
-  std::size_t revise(const std::vector<bool>& doubtful, const Progress& progress);
+  /// Examines every link of a patch that is `doubtful` [n] for the first time again, with all rays.
+  /// Where the rays disagree, the link is split down to that patch, then and later.
+  void revise(const std::vector<bool>& doubtful, const Progress& progress);
 
-  /// The number of links that run() makes, without those between nodes that are hidden from each
-  /// other: from `sample` pairs of each generation, spread over it. Changes no links.
-  double forecast(std::size_t sample, const Progress& progress);
+  /// The number of links that refine() makes, without those between nodes that are hidden from
+  /// each other: from `sample` pairs of each generation, spread over it. Changes no links.
+  double forecast(double epsilon, std::size_t sample, const Progress& progress);
 
-  /// Adds links between single patches, which must be in no other link that exchanges light. The
-  /// links from the returned number on are new.
-  std::size_t add(std::span<const std::pair<std::uint32_t, std::uint32_t>> leaves);
+  /// Adds links between single patches, which must be in no other link that exchanges light.
+  void add(std::span<const std::pair<std::uint32_t, std::uint32_t>> leaves);
 
   /// Every pair of patches that can exchange light is in at most one link. Links with an exchange
   /// area of 0 are pairs that are hidden from each other.
   std::span<const Link> links() const { return links_; }
   std::span<Link> links() { return links_; }
-  std::vector<Link> take_links() { return std::move(links_); }
   /// Pairs of nodes that were examined.
   std::uint64_t candidate_count() const { return candidate_count_; }
   std::uint64_t ray_count() const { return ray_count_; }
+  std::uint64_t held_bytes() const {
+    return links_.capacity() * sizeof(Link) + empty_.capacity() * sizeof(Candidate);
+  }
 
  private:
-  /// The result of the last rays between ancestors of a pair.
-  enum class View : std::uint8_t { kUnknown, kClear, kMixed };
+  using View = Link::View;
   struct Candidate {
     std::uint32_t a, b;
     View view;
@@ -88,19 +97,24 @@ class LinkRefinement {
   struct Scratch;
 
   void refine(std::vector<Candidate> generation, const Progress& progress);
+  template <typename Again>
+  std::vector<Candidate> take(const Again& again);
+  std::vector<std::uint8_t> nodes_with(const std::vector<bool>& patches) const;
   void decide(const std::vector<Candidate>& generation, std::vector<Outcome>& outcomes,
               const Progress& progress);
   Outcome decide(const Candidate& pair, Scratch& scratch) const;
   Outcome link_patches(const Candidate& pair) const;
   Outcome link_nodes(const Candidate& pair, Scratch& scratch) const;
   Outcome link_mixed(const Candidate& pair, const PairKernel& kernel,
-                     const LinkRays::Visibility& visible) const;
+                     const LinkRays::Visibility& visible, double least_squared) const;
   Outcome make_link(const Candidate& pair, const PairKernel& kernel,
-                    const LinkRays::Visibility& visible) const;
+                    const LinkRays::Visibility& visible, double least_squared) const;
   Outcome split(const Candidate& pair, View view) const;
-  double allowed_squared(const LinkNode& a, const LinkNode& b) const;
+  double weight_squared(const Candidate& pair) const;
+  double allowed_squared(const Candidate& pair) const;
   std::vector<Candidate> merge(const std::vector<Candidate>& generation,
                                const std::vector<Outcome>& outcomes);
+  double part_of_pairs(const Candidate& pair) const;
   void append_children(const Candidate& pair, const Outcome& outcome,
                        std::vector<Candidate>& next) const;
   bool needs_all_rays(const Candidate& pair) const;
@@ -110,7 +124,10 @@ class LinkRefinement {
   const ShadowRays& shadow_rays_;
   const FormFactorSettings settings_;
   const LinkRays rays_;
+  double epsilon_ = 0;
   std::vector<Link> links_;
+  /// Pairs of nodes between which nothing was found to exchange light, for the last epsilon.
+  std::vector<Candidate> empty_;
   /// [nodes] nonzero if a node holds a doubtful patch; empty if none does.
   std::vector<std::uint8_t> doubtful_;
   double done_ = 0;  ///< fraction of all pairs of points that is settled

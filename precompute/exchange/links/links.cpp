@@ -1,9 +1,7 @@
 
 #include "precompute/exchange/links/links.h"
 #include "precompute/exchange/links/link_scaling.h"
-#include "precompute/exchange/links/refined_links.h"
 #include "rebounce/error.h"
-#include "transfer/base/bfloat16.h"
 
 namespace rebounce {
 namespace {
@@ -27,38 +25,39 @@ void copy_links(std::span<const Link> from, FormFactorLinks& links) {
   }
 }
 
-/// Rounds gradients to the precision that LinkedFormFactors stores, before rows are added up:
-/// everything that is made from the links then uses the same F.
-void round_gradients(std::span<Link> links) {
-  for (Link& link : links) {
-    for (float& g : link.gradient_a) g = round_to_bfloat16(g);
-    for (float& g : link.gradient_b) g = round_to_bfloat16(g);
+/// The settings, once they are checked.
+const FormFactorSettings& checked(const FormFactorSettings& settings, std::span<const float> weight,
+                                  std::size_t patch_count) {
+  check_form_factor_settings(settings);
+  if (!weight.empty() && weight.size() != patch_count) {
+    throw Error("links: weights and patches differ in number");
   }
+  return settings;
 }
 
 }  // namespace
 
-LinkBuild build_links(const PatchModel& model, const RayTracer& tracer,
-                      const FormFactorSettings& settings, std::span<const float> weight,
-                      const Progress& progress) {
-  check_form_factor_settings(settings);
-  if (!(settings.link_epsilon > 0)) throw Error("links: link_epsilon must be above 0");
-  if (!weight.empty() && weight.size() != model.patches.size()) {
-    throw Error("links: weights and patches differ in number");
-  }
-  const PatchGeometry geometry(model, tracer);
-  const ShadowRays shadow_rays(geometry, settings.seed, settings.kernel_tolerance);
-  RefinedLinks refined = refine_links(model, shadow_rays, tracer, settings, weight, progress);
-  round_gradients(refined.links);
+LinkBuilder::LinkBuilder(const PatchModel& model, const RayTracer& tracer,
+                         const FormFactorSettings& settings, std::span<const float> weight)
+    : geometry_(model, tracer),
+      shadow_rays_(geometry_, settings.seed, settings.kernel_tolerance),
+      links_(model, shadow_rays_, tracer, checked(settings, weight, model.patches.size()), weight) {
+}
+
+LinkBuild LinkBuilder::build(double epsilon, const Progress& progress) {
+  if (!(epsilon > 0)) throw Error("links: link_epsilon must be above 0");
+  if (epsilon_ > 0 && !(epsilon < epsilon_)) throw Error("links: epsilon must become smaller");
+  epsilon_ = epsilon;
+  links_.refine(epsilon, progress);
   LinkBuild build;
-  const LinkScaling scaling = scale_links(refined.tree, refined.links, refined.target);
-  copy_tree(refined.tree, build.links);
-  copy_links(refined.links, build.links);
+  const LinkScaling scaling = scale_links(links_.tree(), links_.links(), links_.target());
+  copy_tree(links_.tree(), build.links);
+  copy_links(links_.links(), build.links);
   build.links.scale.assign(scaling.factor.begin(), scaling.factor.end());
   build.closure = scaling.closure;
-  static_cast<EscapedLight&>(build) = share_escape(scaling.row_sum, refined.escape);
-  build.ray_count = refined.ray_count;
-  build.candidate_count = refined.candidate_count;
+  static_cast<EscapedLight&>(build) = share_escape(scaling.row_sum, links_.escape());
+  build.ray_count = links_.ray_count();
+  build.candidate_count = links_.candidate_count();
   return build;
 }
 

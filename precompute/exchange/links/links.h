@@ -4,8 +4,11 @@
 #include <span>
 
 #include "precompute/base/progress.h"
+#include "precompute/exchange/links/refined_links.h"
 #include "precompute/exchange/pairs/exchange_results.h"
 #include "precompute/exchange/pairs/form_factor_settings.h"
+#include "precompute/exchange/pairs/patch_geometry.h"
+#include "precompute/exchange/pairs/shadow_rays.h"
 #include "precompute/patches/patch_model.h"
 #include "runtime/rays/ray_tracer.h"
 #include "transfer/exchange/linked_form_factors.h"
@@ -21,15 +24,30 @@ struct LinkBuild : EscapedLight {
 
 /// Computes the form factors as links between nodes of a tree of patches. The number of links and
 /// the work grow about with n instead of n² (notes/concepts/links.md). The links are scaled so that
-/// rows add up to 1 minus what escapes; reciprocity holds.
-///
-/// `tracer` holds the first surface_count triangles of model.mesh. settings.link_epsilon must be
-/// above 0. `weight` [n] >= 0 is the weight of errors in the light from each patch, for instance
-/// its radiosity divided by the mean ("BF refinement"); empty: 1. The bits do not depend on the
-/// number of threads. Throws Error if a setting is out of range, Cancelled if `progress` asks to
-/// stop.
-LinkBuild build_links(const PatchModel& model, const RayTracer& tracer,
-                      const FormFactorSettings& settings, std::span<const float> weight = {},
-                      const Progress& progress = {});
+/// rows add up to 1 minus what escapes; reciprocity holds. The bits do not depend on the number of
+/// threads.
+class LinkBuilder {
+ public:
+  /// `tracer` holds the first surface_count triangles of model.mesh; both must outlive the object.
+  /// `weight` [n] >= 0 is the weight of errors in the light from each patch, for instance its
+  /// radiosity divided by the mean ("BF refinement"); empty: 1. Throws Error if a setting is out of
+  /// range.
+  LinkBuilder(const PatchModel& model, const RayTracer& tracer, const FormFactorSettings& settings,
+              std::span<const float> weight = {});
+
+  /// The links for settings.link_epsilon, which must be above 0. When called again with a smaller
+  /// epsilon, links that are near enough stay, so that it takes a part of the time. Throws
+  /// Cancelled if `progress` asks to stop.
+  LinkBuild build(double epsilon, const Progress& progress = {});
+
+  /// Memory that is kept for finer links.
+  std::uint64_t held_bytes() const { return links_.held_bytes(); }
+
+ private:
+  const PatchGeometry geometry_;
+  const ShadowRays shadow_rays_;
+  RefinedLinks links_;
+  double epsilon_ = 0;  ///< of the last links
+};
 
 }  // namespace rebounce

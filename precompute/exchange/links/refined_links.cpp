@@ -4,11 +4,9 @@
 #include <cmath>
 #include <utility>
 
-#include "precompute/base/parallel_progress.h"
 #include "precompute/exchange/links/hidden_links.h"
 #include "precompute/exchange/links/leaf_links.h"
 #include "precompute/exchange/links/link_scaling.h"
-#include "runtime/rays/sampling.h"
 
 namespace rebounce {
 namespace {
@@ -32,160 +30,85 @@ FormFactorSettings with_more_probes(FormFactorSettings settings) {
   return settings;
 }
 
-/// Finds what escapes, and what links between single patches exchange.
-class LinkMeasurement {
- public:
-  LinkMeasurement(const PatchModel& model, const ShadowRays& shadow_rays, const RayTracer& tracer,
-                  const FormFactorSettings& settings)
-      : model_(model),
-        shadow_rays_(shadow_rays),
-        geometry_(shadow_rays.geometry()),
-        tracer_(tracer),
-        settings_(settings),
-        triangles_(model.mesh.triangle_patch, model.patches.size()) {}
-
-  /// Measures `links`, and returns the escape of all patches.
-  std::vector<Escape> run(LeafLinks& links, const Progress& progress) {
-    std::vector<Escape> escape(model_.patches.size());
-    measure(links, std::vector<bool>(escape.size(), true), escape, progress);
-    return escape;
+/// Rays that leave each patch beside the first ones, so that what its coarse links exchange is
+/// known as well as what other links do.
+std::vector<double> further_rays(const LeafLinks& links, const CountedExchange& counted,
+                                 double epsilon, int first_rays) {
+  std::vector<double> more = links.counted_variance(counted);
+  for (double& m : more) {
+    const double times = std::pow(std::sqrt(m) / (kCoarseNoise * epsilon), kRaysOfNoise);
+    m = times > 1 ? (std::min(std::ceil(times), kMostHemispheres) - 1) * first_rays : 0;
   }
-
-  /// Measures `links`, with the same rays.
-  void revise(LeafLinks& links, const Progress& progress) {
-    std::vector<Escape> escape(model_.patches.size());
-    std::vector<bool> involved;
-    for (std::uint32_t i = 0; i < escape.size(); ++i) involved.push_back(links.involves(i));
-    measure(links, involved, escape, progress);
-  }
-
-  /// Adds links between single patches that hemisphere rays join although shadow rays between
-  /// nodes found them hidden, and measures these.
-  void add_seen(LinkRefinement& refinement, const LinkTree& tree, const Progress& progress) {
-    const HiddenLinks hidden(tree, refinement.links());
-    if (hidden.empty()) return;
-    const std::size_t n = model_.patches.size();
-    const std::vector<double> rays(n, settings_.hemisphere_rays);
-    std::vector<std::vector<MetPatch>> seen(n);
-    trace_hemispheres(rays, settings_.seed, part_of(progress, 0.0, 0.5),
-                      [&](std::uint32_t i, const Escape&, std::span<const MetPatch> met) {
-                        seen[i] = hidden.seen(i, met);
-                      });
-    Ranks().share(std::span(seen));
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> leaves;
-    for (std::uint32_t i = 0; i < n; ++i) {
-      for (const MetPatch& m : seen[i]) {
-        leaves.push_back(std::minmax({hidden.leaf(i), hidden.leaf(m.patch)}));
-      }
-    }
-    std::ranges::sort(leaves);
-    leaves.erase(std::unique(leaves.begin(), leaves.end()), leaves.end());
-    const std::size_t known = refinement.add(leaves);
-    LeafLinks added(tree, refinement.links().subspan(known));
-    for (std::uint32_t i = 0; i < n; ++i) added.count(i, seen[i]);
-    measure(added, rays, part_of(progress, 0.5, 1.0));
-  }
-
-  std::uint64_t ray_count() const { return ray_count_; }
-
- private:
-  /// Measures `links` from what `rays` [n] of each patch have counted.
-  void measure(LeafLinks& links, std::vector<double> rays, const Progress& progress) {
-    const CountedExchange counted(geometry_.areas(), std::move(rays));
-    const PairExchange exchange(shadow_rays_, tracer_, counted, settings_);
-    ray_count_ += links.measure(geometry_, exchange, settings_.probe_rays, progress);
-  }
-
-  void measure(LeafLinks& links, const std::vector<bool>& wanted, std::vector<Escape>& escape,
-               const Progress& progress) {
-    std::vector<double> rays(escape.size(), settings_.hemisphere_rays), more(rays.size(), 0.0);
-    for (std::size_t i = 0; i < rays.size(); ++i) more[i] = wanted[i] ? rays[i] : 0;
-    const auto keep = [&](std::uint32_t i, const Escape& of_patch, std::span<const MetPatch> met) {
-      escape[i] = of_patch;
-      links.count(i, met);
-    };
-    const Ranks ranks;
-    trace_hemispheres(more, settings_.seed, part_of(progress, 0.0, 0.3), keep);
-    links.add_up_counts(ranks);
-    more = further_rays(links, CountedExchange(geometry_.areas(), rays));
-    trace_hemispheres(more, mix_bits(settings_.seed), part_of(progress, 0.3, 0.6), keep);
-    links.add_up_counts(ranks);
-    share(ranks, escape);
-    for (std::size_t i = 0; i < rays.size(); ++i) rays[i] += more[i];
-    measure(links, std::move(rays), part_of(progress, 0.6, 1.0));
-  }
-
-  /// Rays that leave each patch beside the first ones, so that what its coarse links exchange is
-  /// known as well as what other links do.
-  std::vector<double> further_rays(const LeafLinks& links, const CountedExchange& counted) const {
-    std::vector<double> more = links.counted_variance(geometry_, counted);
-    const double allowed = kCoarseNoise * settings_.link_epsilon;
-    for (double& m : more) {
-      const double times = std::pow(std::sqrt(m) / allowed, kRaysOfNoise);
-      m = times > 1 ? (std::min(std::ceil(times), kMostHemispheres) - 1) * settings_.hemisphere_rays
-                    : 0;
-    }
-    return more;
-  }
-
-  /// Traces `count` [n] rays of each patch. `keep`(i, escape, met) is called where there are any,
-  /// from several threads.
-  template <typename Keep>
-  void trace_hemispheres(std::span<const double> count, std::uint64_t seed,
-                         const Progress& progress, const Keep& keep) {
-    const std::size_t n = count.size();
-    const Ranks ranks;
-    ParallelProgress loop(progress, n);
-#pragma omp parallel
-    {
-      EscapeScratch scratch;
-      MetPatchCounter counter;
-#pragma omp for schedule(dynamic, 16)
-      for (std::uint32_t i = 0; i < n; ++i) {
-        if (loop.stopped() || count[i] == 0 || !ranks.makes(i)) continue;
-        const Escape escape = measure_escape(model_.mesh, model_.shown_patch, triangles_[i], i,
-                                             tracer_, static_cast<int>(count[i]), seed, scratch);
-        keep(i, escape, counter.count(n, scratch.met));
-        loop.advance();
-      }
-    }
-    loop.finish();
-    for (const double c : count) ray_count_ += static_cast<std::uint64_t>(c);
-  }
-
-  const PatchModel& model_;
-  const ShadowRays& shadow_rays_;
-  const PatchGeometry& geometry_;
-  const RayTracer& tracer_;
-  const FormFactorSettings& settings_;
-  const PatchTriangles triangles_;
-  std::uint64_t ray_count_ = 0;
-};
+  return more;
+}
 
 }  // namespace
 
-RefinedLinks refine_links(const PatchModel& model, const ShadowRays& shadow_rays,
-                          const RayTracer& tracer, const FormFactorSettings& of_pairs,
-                          std::span<const float> weight, const Progress& progress) {
-  RefinedLinks result{LinkTree(model, shadow_rays.geometry(), weight), {}, {}, {}, 0, 0};
-  const FormFactorSettings settings = with_more_probes(of_pairs);
-  LinkRefinement refinement(result.tree, shadow_rays, tracer, settings);
-  LinkMeasurement measurement(model, shadow_rays, tracer, settings);
-  refinement.run(part_of(progress, 0.0, 0.4));
-  LeafLinks links(result.tree, refinement.links());
-  result.escape = measurement.run(links, part_of(progress, 0.4, 0.5));
-  result.target = row_sum_targets(result.escape, settings.hemisphere_rays);
-  const std::vector<double> ones(model.patches.size(), 1.0);
-  const std::vector<double> sum = gather_links(result.tree, refinement.links(), ones);
-  const std::size_t kept = refinement.revise(
-      find_doubtful_rows(sum, result.target, kLinkRowSumTolerance), part_of(progress, 0.5, 0.8));
-  LeafLinks revised(result.tree, refinement.links().subspan(kept));
-  if (!revised.empty()) measurement.revise(revised, part_of(progress, 0.8, 0.9));
-  measurement.add_seen(refinement, result.tree, part_of(progress, 0.9, 1.0));
-  result.links = refinement.take_links();
-  result.ray_count = refinement.ray_count() + measurement.ray_count();
-  result.candidate_count = refinement.candidate_count();
-  return result;
+RefinedLinks::RefinedLinks(const PatchModel& model, const ShadowRays& shadow_rays,
+                           const RayTracer& tracer, const FormFactorSettings& settings,
+                           std::span<const float> weight)
+    : shadow_rays_(shadow_rays),
+      tracer_(tracer),
+      settings_(with_more_probes(settings)),
+      tree_(model, shadow_rays.geometry(), weight),
+      refinement_(tree_, shadow_rays, tracer, settings_),
+      hemispheres_(model, tracer, settings.hemisphere_rays, settings.seed) {}
+
+void RefinedLinks::refine(double epsilon, const Progress& progress) {
+  for (Link& link : links()) {
+    if (link.measured_area >= 0) link.exchange_area = link.measured_area;
+  }
+  refinement_.refine(epsilon, part_of(progress, 0.0, 0.4));
+  if (target_.empty()) {
+    hemispheres_.trace(part_of(progress, 0.4, 0.5));
+    target_ = row_sum_targets(escape(), settings_.hemisphere_rays);
+  }
+  measure(epsilon, part_of(progress, 0.5, 0.65));
+  const std::vector<double> ones(target_.size(), 1.0);
+  refinement_.revise(
+      find_doubtful_rows(gather_links(tree_, links(), ones), target_, kLinkRowSumTolerance),
+      part_of(progress, 0.65, 0.85));
+  add_seen();
+  measure(epsilon, part_of(progress, 0.85, 1.0));
+}
+
+/// Measures the links between single patches that are new, and what more rays tell of coarse ones.
+void RefinedLinks::measure(double epsilon, const Progress& progress) {
+  const PatchGeometry& geometry = shadow_rays_.geometry();
+  LeafLinks leaves(tree_, geometry, links());
+  leaves.count(hemispheres_);
+  const CountedExchange first(geometry.areas(), hemispheres_.rays());
+  hemispheres_.trace_further(further_rays(leaves, first, epsilon, settings_.hemisphere_rays),
+                             part_of(progress, 0.0, 0.4));
+  leaves.count(hemispheres_);
+  const CountedExchange counted(geometry.areas(), hemispheres_.rays());
+  const PairExchange exchange(shadow_rays_, tracer_, counted, settings_);
+  measuring_rays_ += leaves.measure(exchange, settings_.probe_rays, part_of(progress, 0.4, 1.0));
+}
+
+/// Adds links between single patches that hemisphere rays join although shadow rays between nodes
+/// found them hidden.
+void RefinedLinks::add_seen() {
+  const HiddenLinks hidden(tree_, links());
+  if (hidden.empty()) return;
+  std::vector<std::vector<std::uint32_t>> seen(target_.size());
+  hemispheres_.for_each_patch([&](std::uint32_t i, std::span<const MetPatch> met) {
+    for (const MetPatch& m : hidden.seen(i, met)) seen[i].push_back(m.patch);
+  });
+  Ranks().share(std::span(seen));
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> leaves;
+  for (std::uint32_t i = 0; i < seen.size(); ++i) {
+    for (const std::uint32_t j : seen[i]) {
+      leaves.push_back(std::minmax({hidden.leaf(i), hidden.leaf(j)}));
+    }
+  }
+  std::ranges::sort(leaves);
+  leaves.erase(std::unique(leaves.begin(), leaves.end()), leaves.end());
+  refinement_.add(leaves);
+}
+
+std::uint64_t RefinedLinks::ray_count() const {
+  return refinement_.ray_count() + measuring_rays_ + hemispheres_.traced_rays();
 }
 
 std::size_t forecast_link_count(const PatchModel& model, const RayTracer& tracer,
@@ -194,7 +117,8 @@ std::size_t forecast_link_count(const PatchModel& model, const RayTracer& tracer
   const ShadowRays shadow_rays(geometry, settings.seed, settings.kernel_tolerance);
   const LinkTree tree(model, geometry, {});
   LinkRefinement refinement(tree, shadow_rays, tracer, with_more_probes(settings));
-  return static_cast<std::size_t>(refinement.forecast(kForecastPairs, progress));
+  return static_cast<std::size_t>(
+      refinement.forecast(settings.link_epsilon, kForecastPairs, progress));
 }
 
 }  // namespace rebounce

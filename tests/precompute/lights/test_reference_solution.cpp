@@ -135,7 +135,7 @@ TEST(ReferenceSolution, SolvesOnLinksInDoublePrecision) {
   const Float3 reflectance = {0.9F, 0.5F, 0.1F};
   PatchModel model = make_patch_model(test::room_with_block(reflectance), {.patch_count = 300});
   const FormFactorLinks links =
-      build_links(model, test::make_tracer(model), {.link_epsilon = kLinkEpsilon}).links;
+      LinkBuilder(model, test::make_tracer(model), {}).build(kLinkEpsilon).links;
   const PatchTable& patches = model.patches;
   const LinkedFormFactors form_factors(links, patches.area, patches.centroid);
   const std::vector<Float3> light(patches.size(), Float3{1, 2, 3});

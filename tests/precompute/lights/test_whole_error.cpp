@@ -43,8 +43,7 @@ class WholeErrorOfRoom : public testing::Test {
     tracer_.emplace(test::make_tracer(model));
     FormFactorSettings settings;
     FormFactors pairs = compute_form_factors(model, *tracer_, settings);
-    settings.link_epsilon = kCoarseLinks;
-    const FormFactorLinks links = build_links(model, *tracer_, settings).links;
+    const FormFactorLinks links = LinkBuilder(model, *tracer_, settings).build(kCoarseLinks).links;
     shown_patch_ = model.shown_patch;
     data_ = test::data_of(std::move(model), pairs);
     reference_.emplace(links, data_.patches);

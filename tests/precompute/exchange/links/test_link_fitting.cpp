@@ -74,8 +74,7 @@ double error_of(const Pairs& pairs, const FormFactorLinks& links) {
 FormFactorLinks traced(const Pairs& pairs) {
   const PatchTable& patches = pairs.patches();
   const FormFactorLinks links =
-      build_links(pairs.model, test::make_tracer(pairs.model), {.link_epsilon = kLinkEpsilon})
-          .links;
+      LinkBuilder(pairs.model, test::make_tracer(pairs.model), {}).build(kLinkEpsilon).links;
   return fit_links(links, patches);
 }
 

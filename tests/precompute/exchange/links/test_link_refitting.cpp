@@ -132,7 +132,7 @@ TEST(LinkRefitting, KeepsWhatPatchesExchangeWithThemselves) {
 struct TwoRooms {
   PatchModel model = make_patch_model(scene(), {.patch_count = 600});
   FormFactorLinks links =
-      build_links(model, test::make_tracer(model), {.link_epsilon = kLinkEpsilon}).links;
+      LinkBuilder(model, test::make_tracer(model), {}).build(kLinkEpsilon).links;
 
   static Scene scene() {
     Scene scene = test::empty_scene();

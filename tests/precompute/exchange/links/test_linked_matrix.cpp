@@ -22,7 +22,7 @@ struct LinkedRoom {
   PatchModel model =
       make_patch_model(test::room_with_block({0.6F, 0.5F, 0.4F}), {.patch_count = 400});
   FormFactorLinks links =
-      build_links(model, test::make_tracer(model), {.link_epsilon = kLinkEpsilon}).links;
+      LinkBuilder(model, test::make_tracer(model), {}).build(kLinkEpsilon).links;
 
   const PatchTable& patches() const { return model.patches; }
 };

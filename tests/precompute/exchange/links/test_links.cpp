@@ -37,7 +37,7 @@ PatchModel model_of(const Scene& scene, std::size_t patch_count = 600) {
 
 LinkBuild links_of(const PatchModel& model, double epsilon = kLinkEpsilon,
                    std::span<const float> weight = {}) {
-  return build_links(model, test::make_tracer(model), {.link_epsilon = epsilon}, weight);
+  return LinkBuilder(model, test::make_tracer(model), {}, weight).build(epsilon);
 }
 
 FormFactors form_factors_of(const PatchModel& model) {
@@ -164,6 +164,36 @@ TEST(Links, SmallerErrorsAreSmaller) {
   }
 }
 
+TEST(Links, AreMadeFinerFromCoarserOnes) {
+  const PatchModel& model = furnished().model;
+  const RayTracer tracer = test::make_tracer(model);
+  const std::vector<Float3> light = smooth_light(model.patches);
+  LinkBuilder builder(model, tracer, {});
+  const LinkBuild coarse = builder.build(1e-3);
+  const LinkBuild finer = builder.build(2e-4), alone = links_of(model, 2e-4);
+  const auto count = [](const LinkBuild& build) {
+    return static_cast<double>(build.links.pair.size());
+  };
+  // They differ where rows that the coarse links doubted are examined with all rays.
+  EXPECT_NEAR(count(finer) / count(alone), 1, 0.05);
+  EXPECT_LT(
+      relative_difference(gather(operator_of(finer, model.patches), light),
+                          gather(operator_of(alone, model.patches), light), model.patches.area),
+      1e-3);
+  // Rays between single patches are most of all, and new links have new ones.
+  EXPECT_LT(static_cast<double>(finer.ray_count - coarse.ray_count),
+            0.6 * static_cast<double>(alone.ray_count));
+
+  const FormFactorBlocks pairs(furnished().pairs.exchange, model.patches.area);
+  const std::vector<Float3> truth = gather(pairs, light);
+  const auto error = [&](const LinkBuild& build) {
+    return relative_difference(gather(operator_of(build, model.patches), light), truth,
+                               model.patches.area);
+  };
+  EXPECT_LT(error(finer), 0.7 * error(coarse));
+  EXPECT_LT(error(finer), 1.1 * error(alone));
+}
+
 TEST(Links, WeightsDecideWhereErrorsMatter) {
   const PatchModel model = model_of(test::furnished_room(), 300);
   const std::vector<float> ones(model.patches.size(), 1.0F), fewer(model.patches.size(), 0.1F);
@@ -286,8 +316,11 @@ TEST(Links, SameBitsForAnyNumberOfThreads) {
     LinkBuild build;
     std::vector<Float3> gathered;
   };
+  const RayTracer tracer = test::make_tracer(model);
   const auto make = [&] {
-    Made made{links_of(model), {}};
+    LinkBuilder builder(model, tracer, {});
+    builder.build(10 * kLinkEpsilon);
+    Made made{builder.build(kLinkEpsilon), {}};
     made.gathered = gather(operator_of(made.build, model.patches), light);
     return made;
   };
@@ -303,19 +336,21 @@ TEST(Links, SameBitsForAnyNumberOfThreads) {
 TEST(Links, StopWhenAskedTo) {
   const PatchModel model = model_of(test::furnished_room(), 300);
   const RayTracer tracer = test::make_tracer(model);
-  EXPECT_THROW(
-      build_links(model, tracer, {.link_epsilon = kLinkEpsilon}, {}, [](double) { return false; }),
-      Cancelled);
+  EXPECT_THROW(LinkBuilder(model, tracer, {}).build(kLinkEpsilon, [](double) { return false; }),
+               Cancelled);
 }
 
 TEST(Links, RefuseSettingsOutOfRange) {
   const PatchModel model = model_of(test::furnished_room(), 50);
   const RayTracer tracer = test::make_tracer(model);
   const std::vector<float> few(3, 1.0F);
-  EXPECT_THROW(build_links(model, tracer, {.link_epsilon = 0}), Error);
-  EXPECT_THROW(build_links(model, tracer, {.link_epsilon = -1}), Error);
-  EXPECT_THROW(build_links(model, tracer, {.probe_rays = 257, .link_epsilon = 1e-3}), Error);
-  EXPECT_THROW(build_links(model, tracer, {.link_epsilon = 1e-3}, few), Error);
+  LinkBuilder builder(model, tracer, {});
+  EXPECT_THROW(builder.build(0), Error);
+  EXPECT_THROW(builder.build(-1), Error);
+  builder.build(1e-2);
+  EXPECT_THROW(builder.build(1e-2), Error);
+  EXPECT_THROW(LinkBuilder(model, tracer, {.probe_rays = 257}), Error);
+  EXPECT_THROW(LinkBuilder(model, tracer, {}, few), Error);
 }
 
 }  // namespace
