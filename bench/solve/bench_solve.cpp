@@ -94,8 +94,7 @@ int main(int argc, char** argv) {
                  "Transfer file of the same patches, whose form factors give the truth")
       ->check(CLI::ExistingFile);
   app.add_flag("--iterate", options.light_errors.iterate,
-               "Their truth by conjugate gradients alone, with neither a dense inverse nor the "
-               "operator to begin with");
+               "Their truth by conjugate gradients alone, without an inverse");
   add_common_options(app, options.common);
   return run_program(app, argc, argv, options.common, [&] {
     if (options.part == kLightErrors) {

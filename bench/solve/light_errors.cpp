@@ -7,6 +7,7 @@
 #include "bench/support/input.h"
 #include "precompute/base/symmetric_matrix.h"
 #include "precompute/inverse/dense_transfer.h"
+#include "precompute/inverse/solved_transfer.h"
 #include "precompute/lights/measured_error.h"
 #include "precompute/lights/random_lights.h"
 #include "precompute/lights/reference_lighting.h"
@@ -32,27 +33,27 @@ constexpr int kLightsAtOnce = 1024;
 /// What arrives of lights, as the form factors of a file say.
 class Truth {
  public:
-  /// `data` and `transfer`, an operator of the same patches, must outlive the object.
-  Truth(const TransferData& data, std::shared_ptr<const TransferOperator> transfer, bool iterate)
-      : data_(data),
-        plain_(data),
-        solver_(iterate ? plain_ : plain_.preconditioned(std::move(transfer))) {
-    if (!iterate && !data.exchange.empty()) {
+  /// `data` must outlive the object.
+  Truth(const TransferData& data, bool iterate) : data_(data), plain_(data) {
+    if (iterate) return;
+    if (!data.exchange.empty()) {
       dense_ = build_dense_transfer(data.exchange, data.patches, Precision::kF32);
+    } else if (data.links.empty()) {
+      solved_.emplace(*data.compressed_form_factors, data.patches,
+                      ReferenceSolver::kSinglePrecisionResidual);
     }
   }
 
   std::vector<std::vector<Float3>> operator()(std::span<const std::vector<Float3>> lights) const {
-    return dense_ ? products(DenseMatrix(*dense_), lights)
-                  : solver_.indirect_irradiances(lights, kResidual);
+    if (dense_) return products(DenseMatrix(*dense_), lights);
+    return solved_ ? solved_->indirect_irradiances(lights) : by_iteration(lights);
   }
 
   /// The largest relative difference from plain conjugate gradients over the first lights.
   double error(std::span<const std::vector<Float3>> lights) const {
     const auto some =
         lights.first(std::min<std::size_t>(lights.size(), ReferenceSolver::kBatchLights));
-    const auto truths = (*this)(some);
-    const auto others = plain_.indirect_irradiances(some, kResidual);
+    const auto truths = (*this)(some), others = by_iteration(some);
     double largest = 0;
     for (std::size_t k = 0; k < some.size(); ++k) {
       if (arrives_nowhere(others[k], some[k], data_.patches.area)) continue;
@@ -62,9 +63,14 @@ class Truth {
   }
 
  private:
+  std::vector<std::vector<Float3>> by_iteration(std::span<const std::vector<Float3>> lights) const {
+    return plain_.indirect_irradiances(lights, kResidual);
+  }
+
   const TransferData& data_;
-  ReferenceSolver plain_, solver_;
-  std::shared_ptr<const DenseOperator> dense_;  ///< null: solver_ iterates
+  ReferenceSolver plain_;
+  std::shared_ptr<const DenseOperator> dense_;  ///< of pairs
+  std::optional<SolvedTransfer> solved_;        ///< of compressed form factors
 };
 
 /// A number of the report of a file; empty where it has none.
@@ -144,7 +150,7 @@ void measure_light_errors(const TransferData& data, const LightErrorSettings& se
                           Table& table, Table& single) {
   const RayTracer tracer = make_surface_tracer(data.mesh);
   const auto with_truth = truth_of(data, settings.truth);
-  const Truth truth(*with_truth, data.transfer, settings.iterate);
+  const Truth truth(*with_truth, settings.iterate);
   const BuildRecord& record = data.record;
   const double limit = kLargestOverMean * record.tolerance;
   for (const LightKind kind : kLightKinds) {

@@ -11,8 +11,7 @@ namespace rebounce::bench {
 struct LightErrorSettings {
   int light_count = 1000;     ///< of each kind
   std::uint64_t seed = 4711;  ///< none that operators are built or checked with
-  /// The truth by conjugate gradients alone, with neither a dense inverse nor the operator to begin
-  /// with: many times slower.
+  /// The truth by conjugate gradients alone, without an inverse: many times slower.
   bool iterate = false;
   /// Transfer file of the same patches, whose form factors give the truth instead of those that the
   /// operator was made from; empty: none.
@@ -29,9 +28,9 @@ Table make_single_light_table();
 /// Adds a row for each kind of light: the errors of the operator of `data` under fresh lights,
 /// beside the bounds on record and what the file says of its error against all pairs, and to
 /// `single` one for each light. The truth is that of the form factors of `data`, which are to be
-/// those that the operator was made from, or of another file: by conjugate gradients or, of pairs,
-/// a dense inverse of their own, which is many times faster and is itself held against conjugate
-/// gradients. Throws Error if the other file has other patches.
+/// those that the operator was made from, or of another file: of pairs by a dense inverse of their
+/// own, of compressed form factors by many solves side by side, which are many times faster and are
+/// themselves held against conjugate gradients. Throws Error if the other file has other patches.
 void measure_light_errors(const TransferData& data, const LightErrorSettings& settings,
                           Table& table, Table& single);
 

@@ -51,9 +51,9 @@ constexpr std::size_t kThreadBytesOfPatch = 5'000, kMostThreadBytes = 10'000'000
 // Copies of the factors of a low-rank operator while they are found.
 constexpr std::size_t kFactorCopies = 6;
 
-// A link during refinement: the link with room to grow, its copy, and what its rays are counted in
+// A link during refinement: the link, its copy, and what its rays are counted in
 // or the flat arrays.
-constexpr std::size_t kLinkBytesFound = 130;
+constexpr std::size_t kLinkBytesFound = 140;
 // A patch then, as from pairs.
 constexpr std::size_t kPatchBytesOfLinks = 17'500;
 

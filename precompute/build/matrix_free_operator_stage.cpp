@@ -10,6 +10,7 @@
 #include "precompute/compression/form_factor_compression.h"
 #include "precompute/compression/matrix_free_transfer.h"
 #include "precompute/exchange/links/link_fitting.h"
+#include "precompute/inverse/corrected_solver.h"
 #include "precompute/inverse/dense_transfer.h"
 #include "precompute/lights/error_reference.h"
 #include "precompute/lights/fitting_lights.h"
@@ -116,8 +117,7 @@ class LinkedOperator {
         report_(report),
         clock_(clock),
         links_(std::make_shared<const LinkedFormFactors>(data.links, data.patches.area,
-                                                         data.patches.centroid)),
-        reference_(links_, data.patches) {}
+                                                         data.patches.centroid)) {}
 
   void make(std::span<const std::uint32_t> shown_patch) {
     FormFactorLinks fewer = clock_.run("fewer links", [&](const Progress& part) {
@@ -129,11 +129,13 @@ class LinkedOperator {
     check(decided_.form_factors.seed);
     const double finer = finer_tolerance(data_.record);
     if (finer > 0) make_again(finer);
-    solved_.reset();
     report_.whole_error = clock_.run("check by rays", [&](const Progress& part) {
-      return whole_->estimate(shown_patch, tracer_, reference_.preconditioned(data_.transfer),
-                              part);
+      const auto transfer = [&](Exitances lights) {
+        return solved_->solved().indirect_irradiances(lights);
+      };
+      return whole_->estimate(shown_patch, tracer_, transfer, part);
     });
+    solved_.reset();
     // The check is the last step that needs all of them.
     data_.links = decided_.store_links ? std::move(fewer) : FormFactorLinks{};
     if (decided_.store_links) report_.link_count = data_.links.pair.size();
@@ -188,14 +190,17 @@ class LinkedOperator {
 
   /// Measures the error of the operator under lights of this `seed`.
   void check(std::uint64_t seed) {
-    const ReferenceSolver solver = reference_.preconditioned(data_.transfer);
+    const CorrectedSolver solver(solved_->solved(), links_, data_.patches);
+    const auto truth_of = [&](Exitances some) {
+      return solver.indirect_irradiances(some, reference_residual(decided_.tolerance));
+    };
     whole_.emplace(data_, roles_, decided_.form_factors.seed,
                    WholeErrorEstimator::sample_for(data_.patches.size()));
     errors_ = clock_.run("check", [&](const Progress& part) {
       if (roles_.all_are_both()) {
         data_.record.solve_residual = transfer_residual(*data_.transfer, *links_, data_.patches);
       }
-      return measure_error(data_, tracer_, solver, decided_.tolerance, seed, part,
+      return measure_error(data_, tracer_, truth_of, seed, part,
                            [&](const auto&... light) { whole_->add(light...); });
     });
     record_build(decided_, report_, errors_, data_);
@@ -220,7 +225,6 @@ class LinkedOperator {
   BuildReport& report_;
   PhaseClock& clock_;
   std::shared_ptr<const LinkedFormFactors> links_;  ///< from the first light to the last check
-  ReferenceSolver reference_;
   FittedLights lights_;
   std::optional<MatrixFreeTransfer> solved_;
   std::optional<WholeErrorEstimator> whole_;

@@ -114,6 +114,10 @@ MatrixFreeTransfer::MatrixFreeTransfer(const HierarchicalOperator& form_factors,
 
 MatrixFreeTransfer::~MatrixFreeTransfer() = default;
 
+const SolvedTransfer& MatrixFreeTransfer::solved() const {
+  return state_->solved;
+}
+
 double MatrixFreeTransfer::solving_part() const {
   return state_->solving_part;
 }

@@ -4,6 +4,7 @@
 
 #include "precompute/base/progress.h"
 #include "precompute/compression/matrix_free_plan.h"
+#include "precompute/inverse/solved_transfer.h"
 #include "precompute/lights/fitting_lights.h"
 #include "transfer/file/transfer_data.h"
 #include "transfer/operator/hierarchical_operator.h"
@@ -37,6 +38,9 @@ class MatrixFreeTransfer {
   std::shared_ptr<const HierarchicalOperator> compress(const FittingLights& lights,
                                                        double tolerance,
                                                        const Progress& progress = {}) const;
+
+  /// Products with the inverse of `form_factors`, as exact as the bases need.
+  const SolvedTransfer& solved() const;
 
   /// The part of the time that solving takes, for progress.
   double solving_part() const;

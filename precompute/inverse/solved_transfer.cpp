@@ -232,6 +232,38 @@ MatrixXf SolvedTransfer::multiply(std::uint32_t matrix, const MatrixXf& x) const
   return result;
 }
 
+std::vector<std::vector<Float3>> SolvedTransfer::indirect_irradiances(
+    std::span<const std::vector<Float3>> initial_exitances) const {
+  const std::size_t n = patch().size(), count = initial_exitances.size();
+  std::vector<float> root(area().begin(), area().end());
+  for (float& r : root) r = std::sqrt(r);
+  std::vector<std::vector<Float3>> result(count, std::vector<Float3>(n));
+  for (std::uint32_t m = 0; m < matrix_count(); ++m) {
+    std::vector<int> channels;
+    for (int c = 0; c < kChannelCount; ++c) {
+      if (channel_matrix_[c] == m) channels.push_back(c);
+    }
+    MatrixXf columns(n, channels.size() * count);
+    const auto for_each_column = [&](const auto& visit) {
+#pragma omp parallel for schedule(static)
+      for (std::size_t column = 0; column < channels.size() * count; ++column) {
+        float* const values = columns.col(static_cast<Index>(column)).data();
+        for (std::size_t i = 0; i < n; ++i) {
+          visit(column % count, channels[column / count], i, values[i]);
+        }
+      }
+    };
+    for_each_column([&](std::size_t light, int c, std::size_t i, float& value) {
+      value = root[i] * initial_exitances[light][i][c];
+    });
+    columns = multiply(m, columns);
+    for_each_column([&](std::size_t light, int c, std::size_t i, float value) {
+      result[light][i][c] = value / root[i];
+    });
+  }
+  return result;
+}
+
 Eigen::VectorXd SolvedTransfer::estimated_energies(const PatchRoles& roles) const {
   const auto n = static_cast<Index>(patch().size());
   std::mt19937_64 engine(1);

@@ -53,6 +53,11 @@ class SolvedTransfer {
   /// Error if the steps do not converge.
   Eigen::MatrixXf multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const;
 
+  /// The indirect irradiances [n] in lx of lights, given as initial exitances [n] in lx. Dozens of
+  /// lights at a time fill the products. All ranks call it together. Throws likewise.
+  std::vector<std::vector<Float3>> indirect_irradiances(
+      std::span<const std::vector<Float3>> initial_exitances) const;
+
   /// Memory of one thread that solves. It grows to what is needed and is kept, because new pages
   /// for every few columns cost time.
   struct Workspace {

@@ -35,7 +35,13 @@ SampledError error_of_links(const TransferData& data, std::span<const std::uint3
     roles.keep(PatchRoles::kReceiver, received);
     estimator.add(lights[k], truths[k], received);
   }
-  return estimator.estimate(shown_patch, tracer, solver, progress).links;
+  const auto transfer = [&](std::span<const std::vector<Float3>> light) {
+    return solve_batches(light, {}, [&](std::span<const std::vector<Float3>> some) {
+      constexpr double kEnough = WholeErrorEstimator::kSpreadResidual;
+      return solver.indirect_irradiances(some, kEnough, kEnough);
+    });
+  };
+  return estimator.estimate(shown_patch, tracer, transfer, progress).links;
 }
 
 }  // namespace rebounce

@@ -23,6 +23,9 @@ using Exitances = std::vector<std::vector<Float3>>;
 // errors alone.
 constexpr int kLightCount = 256, kRoundedLightCount = 16;
 
+// Lights whose truth is asked for at a time.
+constexpr std::size_t kLightsTogether = 64;
+
 // Residuals of the reference: relative to the initial exitance, where rounding errors are above it;
 // and relative to the reflected light, in parts of the tolerance, where it changes an error by a
 // thousandth at most (lab/049).
@@ -59,11 +62,27 @@ std::vector<KindError> measure(const TransferData& data, const RayTracer& tracer
   return result;
 }
 
+/// The errors of `light_count` lights of each kind.
+std::vector<KindError> measure_against(const TransferData& data, const RayTracer& tracer,
+                                       const IrradiancesOf& truth_of, int light_count,
+                                       std::uint64_t seed, const Progress& progress,
+                                       const LightListener& on_point_light) {
+  const auto errors_of = [&](LightKind kind, const Exitances& lights, const Progress& part) {
+    std::vector<double> errors;
+    const LightListener& on_light = kind == LightKind::kPoint ? on_point_light : LightListener();
+    for (const LightError& light : light_errors(data, lights, truth_of, part, on_light)) {
+      errors.push_back(light.error);
+    }
+    return errors;
+  };
+  return measure(data, tracer, light_count, seed, errors_of, progress);
+}
+
 }  // namespace
 
 std::vector<LightError> light_errors(const TransferData& data,
                                      std::span<const std::vector<Float3>> lights,
-                                     const TruthOf& truth_of, const Progress& progress,
+                                     const IrradiancesOf& truth_of, const Progress& progress,
                                      const LightListener& on_light) {
   const std::vector<float>& area = data.patches.area;
   std::vector<Float3> indirect_irradiance(data.patches.size());
@@ -71,11 +90,10 @@ std::vector<LightError> light_errors(const TransferData& data,
   ErrorReference received;
   std::vector<std::vector<Float3>> arrived, results;
   std::vector<LightError> errors;
-  const std::size_t together = Ranks().count() * ReferenceSolver::kBatchLights;
-  for (std::size_t done = 0; done < lights.size(); done += together) {
+  for (std::size_t done = 0; done < lights.size(); done += kLightsTogether) {
     report_progress(progress, static_cast<double>(done) / lights.size());
-    const auto some = lights.subspan(done, std::min(lights.size() - done, together));
-    auto truths = solve_batches(some, {}, truth_of);
+    const auto some = lights.subspan(done, std::min(lights.size() - done, kLightsTogether));
+    auto truths = truth_of(some);
     for (std::size_t k = 0; k < some.size(); ++k) {
       if (arrives_nowhere(truths[k], some[k], area)) continue;
       data.transfer->apply(some[k], indirect_irradiance, workspace);
@@ -103,7 +121,13 @@ std::vector<KindError> measure_error(const TransferData& data, const RayTracer& 
         "measured error: the data hold neither pairs nor links for a reference; store links");
   }
   if (exact == nullptr) {
-    return measure_error(data, tracer, ReferenceSolver(data), 0, seed, progress);
+    const ReferenceSolver reference(data);
+    const auto truth_of = [&](std::span<const std::vector<Float3>> lights) {
+      return solve_batches(lights, {}, [&](std::span<const std::vector<Float3>> some) {
+        return reference.indirect_irradiances(some, kReferenceResidual);
+      });
+    };
+    return measure_against(data, tracer, truth_of, kRoundedLightCount, seed, progress, {});
   }
   const auto errors_of = [&](LightKind, const Exitances& lights, const Progress&) {
     return ReferenceLighting(DenseMatrix(*exact, data.transfer->roles()), lights)
@@ -112,24 +136,15 @@ std::vector<KindError> measure_error(const TransferData& data, const RayTracer& 
   return measure(data, tracer, kLightCount, seed, errors_of, progress);
 }
 
+double reference_residual(double tolerance) {
+  return kResidualOfTolerance * tolerance;
+}
+
 std::vector<KindError> measure_error(const TransferData& data, const RayTracer& tracer,
-                                     const ReferenceSolver& reference, double tolerance,
-                                     std::uint64_t seed, const Progress& progress,
+                                     const IrradiancesOf& truth_of, std::uint64_t seed,
+                                     const Progress& progress,
                                      const LightListener& on_point_light) {
-  const auto errors_of = [&](LightKind kind, const Exitances& lights, const Progress& part) {
-    const auto truth_of = [&](std::span<const std::vector<Float3>> some) {
-      return reference.indirect_irradiances(some, kReferenceResidual,
-                                            kResidualOfTolerance * tolerance);
-    };
-    std::vector<double> errors;
-    const LightListener& on_light = kind == LightKind::kPoint ? on_point_light : LightListener();
-    for (const LightError& light : light_errors(data, lights, truth_of, part, on_light)) {
-      errors.push_back(light.error);
-    }
-    return errors;
-  };
-  return measure(data, tracer, tolerance > 0 ? kLightCount : kRoundedLightCount, seed, errors_of,
-                 progress);
+  return measure_against(data, tracer, truth_of, kLightCount, seed, progress, on_point_light);
 }
 
 }  // namespace rebounce

@@ -7,7 +7,7 @@
 
 #include "precompute/base/progress.h"
 #include "precompute/lights/random_lights.h"
-#include "precompute/lights/reference_solution.h"
+#include "precompute/lights/solve_batches.h"
 #include "runtime/rays/ray_tracer.h"
 #include "transfer/file/transfer_data.h"
 #include "transfer/operator/dense_operator.h"
@@ -32,11 +32,6 @@ struct LightError {
   std::size_t light = 0;  ///< its place among the lights
 };
 
-/// Returns the reference: indirect irradiances [n] in lx of some lights, given as initial exitances
-/// [n] in lx.
-using TruthOf =
-    std::function<std::vector<std::vector<Float3>>(std::span<const std::vector<Float3>>)>;
-
 /// Called for each light that has an error, in order: its initial exitance, the reference on all
 /// patches, and what data.transfer gives, all [n] in lx.
 using LightListener =
@@ -44,12 +39,12 @@ using LightListener =
                        std::span<const Float3> result)>;
 
 /// The errors of data.transfer under `lights`, each cut to what sources emit, against `truth_of`.
-/// It is called for ReferenceSolver::kBatchLights lights at a time. The errors keep the order of
-/// the lights; lights from which nothing arrives (arrives_nowhere) are left out. Throws Cancelled
-/// if asked to stop.
+/// It is called for some dozens of lights at a time. The errors keep the order of the lights;
+/// lights from which nothing arrives (arrives_nowhere) are left out. Throws Cancelled if asked to
+/// stop.
 std::vector<LightError> light_errors(const TransferData& data,
                                      std::span<const std::vector<Float3>> lights,
-                                     const TruthOf& truth_of, const Progress& progress = {},
+                                     const IrradiancesOf& truth_of, const Progress& progress = {},
                                      const LightListener& on_light = {});
 
 /// Measures data.transfer under random lights of every kind that the scene has: light of its
@@ -64,13 +59,15 @@ std::vector<KindError> measure_error(const TransferData& data, const RayTracer& 
                                      const DenseOperator* exact, std::uint64_t seed,
                                      const Progress& progress = {});
 
-/// Measures an operator of `tolerance` that was made from links. `reference` solves with these
-/// links, so exactly that no error changes by a thousandth; 256 lights of a kind. With a tolerance
-/// of 0 this measures rounding errors, with 16 lights of a kind. `on_point_light` is called for
-/// point lights.
+/// The reference of an operator of `tolerance` is so exact that no error changes by a thousandth:
+/// what it is off at the most, relative to the light that arrives.
+double reference_residual(double tolerance);
+
+/// Measures an operator that was made from links against `truth_of`, which solves with these links
+/// to reference_residual(); 256 lights of a kind. `on_point_light` is called for point lights.
 std::vector<KindError> measure_error(const TransferData& data, const RayTracer& tracer,
-                                     const ReferenceSolver& reference, double tolerance,
-                                     std::uint64_t seed, const Progress& progress = {},
+                                     const IrradiancesOf& truth_of, std::uint64_t seed,
+                                     const Progress& progress = {},
                                      const LightListener& on_point_light = {});
 
 }  // namespace rebounce

@@ -81,7 +81,6 @@ Field<kRows> times(const CompressedFormFactors& compressed, const Field<kRows>& 
 struct System {
   const Form& form;
   const PatchTable& patches;
-  const TransferOperator* nearly_inverse;  ///< may be null
 };
 
 /// The residual of (I - rho F) B = M0. A light is solved if one of the two is small enough.
@@ -105,7 +104,6 @@ class ConjugateGradients {
   /// `lights` has at most kLights entries.
   ConjugateGradients(const System& system, Lights lights)
       : form_(system.form),
-        nearly_inverse_(system.nearly_inverse),
         area_(Eigen::Map<const Eigen::VectorXf>(system.patches.area.data(),
                                                 std::ssize(system.patches.area))
                   .cast<double>()),
@@ -125,8 +123,6 @@ class ConjugateGradients {
     const Totals of_initial =
         residual.of_initial_exitance * residual.of_initial_exitance * per_light(product(m0_, m0_));
     Field z = Field::Zero(kRows, m0_.cols());
-    bool conditioned = nearly_inverse_ != nullptr;
-    if (conditioned) z = root_ * transfer(m0_);
     const bool coarse = residual.of_reflected_light >= kSinglePrecisionSuffices;
     for (int steps = 0, round = 0; steps < kMaxSteps; ++round) {
       const Arithmetic arithmetic =
@@ -137,11 +133,7 @@ class ConjugateGradients {
       const Totals allowed = of_initial.max(
           residual.of_reflected_light * residual.of_reflected_light * exitance_squares(reflected));
       if ((exitance_squares(r) <= allowed).all()) return {std::move(b), std::move(h)};
-      if (conditioned) {
-        conditioned = descend_conditioned(r, allowed, arithmetic, z, steps);
-      } else {
-        descend(r, allowed, arithmetic, z, steps);
-      }
+      descend(r, allowed, arithmetic, z, steps);
     }
     throw Error("the reference solution did not converge in " + std::to_string(kMaxSteps) +
                 " steps; a reflectance is too close to 1");
@@ -166,27 +158,6 @@ class ConjugateGradients {
     } while (++steps < kMaxSteps && !(exitance_squares(r) <= allowed).all());
   }
 
-  /// The same, preconditioned by I + R Y R, an approximate inverse of I - R F R. Directions stay
-  /// conjugate although it is rounded (G. H. Golub and Q. Ye, 1999). Returns false, with `z` as far
-  /// as it came, if Y is so wrong that the preconditioner is not positive.
-  bool descend_conditioned(Field r, const Totals& allowed, Arithmetic arithmetic, Field& z,
-                           int& steps) const {
-    Field y = condition(r), p = y;
-    Products ry = product(r, y);
-    for (;;) {
-      if ((ry <= 0 && product(r, r) > 0).any()) return false;
-      const Field q = p - root_ * gather(root_ * p, arithmetic);
-      const Products alpha = quotient(ry, product(p, q));
-      z += p.colwise() * alpha;
-      const Field change = q.colwise() * alpha;
-      r -= change;
-      if (++steps >= kMaxSteps || (exitance_squares(r) <= allowed).all()) return true;
-      y = condition(r);
-      const Products before = std::exchange(ry, product(r, y));
-      p = y - p.colwise() * quotient(product(change, y), before);
-    }
-  }
-
   /// F times `in`; links gather in single precision where that is enough.
   Field gather(const Field& in, Arithmetic arithmetic) const {
     using Links = std::shared_ptr<const LinkedFormFactors>;
@@ -195,28 +166,6 @@ class ConjugateGradients {
       return gather_along<float>(**links, in);
     }
     return std::visit([&](const auto& form) { return times<kRows>(form, in); }, form_);
-  }
-
-  Field condition(const Field& r) const { return r + root_ * transfer(root_ * r); }
-
-  /// Y times `in`, in single precision.
-  Field transfer(const Field& in) const {
-    const auto n = static_cast<std::size_t>(in.cols());
-    std::vector<Float3> from(kLights * n), to(kLights * n);
-    std::vector<float> workspace(nearly_inverse_->batch_workspace_size(kLights));
-    for (int k = 0; k < kRows; ++k) {
-      Float3* const light = from.data() + k / kChannelCount * n;
-      for (std::size_t i = 0; i < n; ++i) {
-        light[i][k % kChannelCount] = static_cast<float>(in(k, i));
-      }
-    }
-    nearly_inverse_->apply_batch(kLights, from, to, workspace);
-    Field out(kRows, in.cols());
-    for (int k = 0; k < kRows; ++k) {
-      const Float3* const light = to.data() + k / kChannelCount * n;
-      for (std::size_t i = 0; i < n; ++i) out(k, i) = light[i][k % kChannelCount];
-    }
-    return out;
   }
 
   /// The squared area norms of R v.
@@ -240,7 +189,6 @@ class ConjugateGradients {
   }
 
   const Form& form_;
-  const TransferOperator* nearly_inverse_;
   Eigen::Array<double, 1, Eigen::Dynamic> area_;
   Field root_, m0_;
 };
@@ -316,16 +264,6 @@ ReferenceSolver::ReferenceSolver(std::shared_ptr<const LinkedFormFactors> links,
 ReferenceSolver::ReferenceSolver(const TransferData& data)
     : patches_(data.patches), form_(best_form(data)) {}
 
-ReferenceSolver ReferenceSolver::preconditioned(
-    std::shared_ptr<const TransferOperator> nearly_inverse) const {
-  if (nearly_inverse->patch_count() != patches_.size()) {
-    throw Error("reference solution: the operator has a different number of patches");
-  }
-  ReferenceSolver solver = *this;
-  if (nearly_inverse->roles().all_are_both()) solver.nearly_inverse_ = std::move(nearly_inverse);
-  return solver;
-}
-
 std::vector<Double3> ReferenceSolver::radiosity(std::span<const Float3> initial_exitance,
                                                 double residual) const {
   const std::vector<Float3> light(initial_exitance.begin(), initial_exitance.end());
@@ -334,7 +272,7 @@ std::vector<Double3> ReferenceSolver::radiosity(std::span<const Float3> initial_
 
 std::vector<std::vector<Double3>> ReferenceSolver::radiosities(
     std::span<const std::vector<Float3>> initial_exitances, double residual) const {
-  return solve({form_, patches_, nearly_inverse_.get()}, initial_exitances,
+  return solve({form_, patches_}, initial_exitances,
                {.of_initial_exitance = residual, .of_reflected_light = 0}, Quantity::kRadiosity);
 }
 
@@ -348,7 +286,7 @@ std::vector<std::vector<Float3>> ReferenceSolver::indirect_irradiances(
     std::span<const std::vector<Float3>> initial_exitances, double residual,
     double of_reflected_light) const {
   const auto solutions =
-      solve({form_, patches_, nearly_inverse_.get()}, initial_exitances,
+      solve({form_, patches_}, initial_exitances,
             {.of_initial_exitance = residual, .of_reflected_light = of_reflected_light},
             Quantity::kIndirectIrradiance);
   std::vector<std::vector<Float3>> result;

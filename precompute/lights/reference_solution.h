@@ -10,7 +10,6 @@
 #include "transfer/exchange/exchange_matrix.h"
 #include "transfer/exchange/linked_form_factors.h"
 #include "transfer/file/transfer_data.h"
-#include "transfer/operator/transfer_operator.h"
 
 namespace rebounce {
 
@@ -47,11 +46,6 @@ class ReferenceSolver {
   /// must outlive the solver. Throws Error if it holds none of them.
   explicit ReferenceSolver(const TransferData& data);
 
-  /// The same system with an operator that nearly solves it, of any error, as first guess and
-  /// preconditioner: fewer steps reach the same residual, which is computed from F. An operator
-  /// with roles is not used. Throws Error if it has other patches.
-  ReferenceSolver preconditioned(std::shared_ptr<const TransferOperator> nearly_inverse) const;
-
   /// Solves (I - rho F) B = M0 until the area-weighted residual is at most `residual` times that of
   /// M0 (default 1e-10); returns the radiosity B [n] in lx. Throws Error if 10,000 steps do not
   /// reach it.
@@ -76,7 +70,6 @@ class ReferenceSolver {
  private:
   const PatchTable& patches_;
   Form form_;
-  std::shared_ptr<const TransferOperator> nearly_inverse_;  ///< may be null
 };
 
 /// Converts a solution [n] to single precision.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -9,6 +10,11 @@
 #include "precompute/lights/reference_solution.h"
 
 namespace rebounce {
+
+/// Returns the indirect irradiances [n] in lx of some lights, given as initial exitances [n] in lx.
+/// All ranks call it together.
+using IrradiancesOf =
+    std::function<std::vector<std::vector<Float3>>(std::span<const std::vector<Float3>>)>;
 
 /// What `solve` makes of `lights`, by batches of ReferenceSolver::kBatchLights: a span of lights
 /// in, as many vectors of Float3 out. Ranks share the batches. Throws Cancelled if asked to stop.

@@ -7,7 +7,6 @@
 #include "precompute/base/parallel_progress.h"
 #include "precompute/base/ranks.h"
 #include "precompute/exchange/pairs/escape.h"
-#include "precompute/lights/solve_batches.h"
 #include "runtime/rays/patch_points.h"
 #include "runtime/rays/sampling.h"
 #include "transfer/base/area_norm.h"
@@ -18,20 +17,14 @@ namespace {
 
 constexpr std::size_t kGroups = WholeErrorEstimator::kGroups;
 
-// Residual of what spreads the errors, relative to the reflected light: their third digit does not
-// matter.
-constexpr double kSpreadResidual = 1e-2;
-
 // The quantile at 97.5 % of Student's distribution with kGroups - 1 = 3 degrees of freedom.
 constexpr double kStudent = 3.182;
 
 // Rays of a group, and of a patch of it at most (lab/111).
 constexpr std::size_t kRaysOfGroup = 1 << 23, kMostRays = 4096;
 
-/// Lights whose groups are spread together: a batch for each rank.
-std::size_t lights_at_once() {
-  return Ranks().count() * ReferenceSolver::kBatchLights / kGroups;
-}
+// Lights whose groups are spread together.
+constexpr std::size_t kLightsAtOnce = 16;
 
 // Rays take this part of the time of an estimate.
 constexpr double kTracingPart = 0.7;
@@ -258,7 +251,7 @@ std::vector<Float3> WholeErrorEstimator::residual(std::size_t group, std::size_t
 }
 
 /// What the groups say that the light of the links lacks, P r = r + Y rho r, into `missing_`.
-void WholeErrorEstimator::spread(const ReferenceSolver& reference, std::size_t first,
+void WholeErrorEstimator::spread(const IrradiancesOf& transfer, std::size_t first,
                                  std::size_t count) {
   std::vector<std::vector<Float3>> reflected;
   missing_.clear();
@@ -268,10 +261,7 @@ void WholeErrorEstimator::spread(const ReferenceSolver& reference, std::size_t f
       reflect(data_.patches.reflectance, reflected.emplace_back(missing_.back()));
     }
   }
-  const auto transferred =
-      solve_batches(reflected, {}, [&](std::span<const std::vector<Float3>> some) {
-        return reference.indirect_irradiances(some, kSpreadResidual, kSpreadResidual);
-      });
+  const auto transferred = transfer(reflected);
   for (std::size_t k = 0; k < missing_.size(); ++k) {
     add_to(missing_[k], transferred[k]);
     roles_.keep(PatchRoles::kReceiver, missing_[k]);
@@ -279,7 +269,7 @@ void WholeErrorEstimator::spread(const ReferenceSolver& reference, std::size_t f
 }
 
 WholeErrorEstimator::Products WholeErrorEstimator::products(std::size_t light) const {
-  const auto missing = std::span(missing_).subspan(light % lights_at_once() * kGroups, kGroups);
+  const auto missing = std::span(missing_).subspan(light % kLightsAtOnce * kGroups, kGroups);
   const std::vector<float>& area = data_.patches.area;
   const std::vector<Float3>& compression = compression_[light];
   Products result;
@@ -295,7 +285,7 @@ WholeErrorEstimator::Products WholeErrorEstimator::products(std::size_t light) c
 }
 
 WholeError WholeErrorEstimator::estimate(std::span<const std::uint32_t> shown_patch,
-                                         const RayTracer& tracer, const ReferenceSolver& reference,
+                                         const RayTracer& tracer, const IrradiancesOf& transfer,
                                          const Progress& progress) {
   const std::size_t lights = compression_.size();
   if (lights == 0) return {};
@@ -303,9 +293,9 @@ WholeError WholeErrorEstimator::estimate(std::span<const std::uint32_t> shown_pa
   gather(shown_patch, tracer, tracing);
   std::vector<Replicates> of_links, of_whole;
   for (std::size_t l = 0; l < lights; ++l) {
-    if (l % lights_at_once() == 0) {
+    if (l % kLightsAtOnce == 0) {
       report_progress(progress, kTracingPart + (1 - kTracingPart) * l / lights);
-      spread(reference, l, std::min(lights_at_once(), lights - l));
+      spread(transfer, l, std::min(kLightsAtOnce, lights - l));
     }
     const Products p = products(l);
     of_links.push_back(

@@ -9,7 +9,7 @@
 #include "precompute/base/progress.h"
 #include "precompute/exchange/pairs/hemisphere_exchange.h"
 #include "precompute/lights/error_reference.h"
-#include "precompute/lights/reference_solution.h"
+#include "precompute/lights/solve_batches.h"
 #include "rebounce/build_report.h"
 #include "runtime/rays/ray_tracer.h"
 #include "transfer/file/transfer_data.h"
@@ -51,11 +51,14 @@ class WholeErrorEstimator {
   void add(std::span<const Float3> initial_exitance, std::span<const Float3> truth,
            std::span<const Float3> result);
 
-  /// The errors over all lights; zeros without any. `shown_patch` [t] is that of PatchModel,
-  /// `reference` solves with the links. No light may be added afterwards. Throws Cancelled if asked
-  /// to stop.
+  /// The errors over all lights; zeros without any. `shown_patch` [t] is that of PatchModel.
+  /// `transfer` is that of the links, or of form factors that are near; a hundredth does not
+  /// matter. No light may be added afterwards. Throws Cancelled if asked to stop.
   WholeError estimate(std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
-                      const ReferenceSolver& reference, const Progress& progress = {});
+                      const IrradiancesOf& transfer, const Progress& progress = {});
+
+  /// The residual of `transfer`, relative to the reflected light, that suffices.
+  static constexpr double kSpreadResidual = 1e-2;
 
  private:
   /// The products of the light that two groups find missing, and of that with the error of
@@ -76,7 +79,7 @@ class WholeErrorEstimator {
   void gather(std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
               const Progress& progress);
   std::vector<Float3> residual(std::size_t group, std::size_t light) const;
-  void spread(const ReferenceSolver& reference, std::size_t first, std::size_t count);
+  void spread(const IrradiancesOf& transfer, std::size_t first, std::size_t count);
   Products products(std::size_t light) const;
 
   const TransferData& data_;

@@ -20,6 +20,9 @@ constexpr double kPlane = 1e-7;
 // Pairs of a generation that one rank decides before the next rank's turn.
 constexpr std::size_t kPairsInTurn = 64;
 
+// Pairs whose outcomes are held at a time.
+constexpr std::size_t kPairsAtOnce = 1 << 18;
+
 // A pair that faces in part may get a link if all of it is below this fraction of the allowed
 // error.
 constexpr double kNegligible = 0.1;
@@ -150,15 +153,36 @@ void LinkRefinement::add(std::span<const std::pair<std::uint32_t, std::uint32_t>
 
 void LinkRefinement::refine(std::vector<Candidate> generation, const Progress& progress) {
   std::vector<Outcome> outcomes;
+  std::vector<std::vector<Link>> made;
   while (!generation.empty()) {
-    outcomes.assign(generation.size(), {});
-    decide(generation, outcomes, progress);
-    generation = merge(generation, outcomes);
+    std::vector<Candidate> next;
+    std::vector<Link>& links = made.emplace_back();
+    for (std::size_t begin = 0; begin < generation.size(); begin += kPairsAtOnce) {
+      const std::span some =
+          std::span(generation).subspan(begin, std::min(kPairsAtOnce, generation.size() - begin));
+      outcomes.assign(some.size(), {});
+      decide(some, outcomes, progress);
+      merge(some, outcomes, links, next);
+    }
+    generation = std::move(next);
+  }
+  append(std::move(made));
+}
+
+/// Appends the links of all generations, and leaves room for those of a smaller epsilon: memory
+/// that nothing is written to takes none.
+void LinkRefinement::append(std::vector<std::vector<Link>> made) {
+  std::size_t count = links_.size();
+  for (const std::vector<Link>& links : made) count += links.size();
+  if (count > links_.capacity()) links_.reserve(2 * count);
+  for (std::vector<Link>& links : made) {
+    links_.insert(links_.end(), links.begin(), links.end());
+    links = {};
   }
 }
 
-void LinkRefinement::decide(const std::vector<Candidate>& generation,
-                            std::vector<Outcome>& outcomes, const Progress& progress) {
+void LinkRefinement::decide(std::span<const Candidate> generation, std::vector<Outcome>& outcomes,
+                            const Progress& progress) {
   const Ranks ranks;
   std::atomic<bool> stop = false;
   std::uint64_t rays = 0;
@@ -294,10 +318,10 @@ LinkRefinement::Outcome LinkRefinement::split(const Candidate& pair, View view) 
   return {first ? Outcome::Kind::kSplitA : Outcome::Kind::kSplitB, view, {}};
 }
 
-/// Merges the outcomes in order; pairs that are split make the next generation.
-std::vector<LinkRefinement::Candidate> LinkRefinement::merge(
-    const std::vector<Candidate>& generation, const std::vector<Outcome>& outcomes) {
-  std::vector<Candidate> next;
+/// Appends the links of `outcomes`, in order, and the parts of pairs that are split.
+void LinkRefinement::merge(std::span<const Candidate> generation,
+                           const std::vector<Outcome>& outcomes, std::vector<Link>& links,
+                           std::vector<Candidate>& next) {
   for (std::size_t k = 0; k < generation.size(); ++k) {
     const Candidate& pair = generation[k];
     const Outcome& outcome = outcomes[k];
@@ -306,13 +330,12 @@ std::vector<LinkRefinement::Candidate> LinkRefinement::merge(
       continue;
     }
     if (outcome.kind == Outcome::Kind::kLink && outcome.link.unoccluded_area > 0) {
-      links_.push_back(outcome.link);
+      links.push_back(outcome.link);
     } else if (outcome.kind == Outcome::Kind::kLink) {
       empty_.push_back(pair);
     }
     done_ += part_of_pairs(pair);
   }
-  return next;
 }
 
 /// The fraction of all pairs of points that a pair of nodes holds.

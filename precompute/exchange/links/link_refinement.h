@@ -79,7 +79,7 @@ class LinkRefinement {
   std::uint64_t candidate_count() const { return candidate_count_; }
   std::uint64_t ray_count() const { return ray_count_; }
   std::uint64_t held_bytes() const {
-    return links_.capacity() * sizeof(Link) + empty_.capacity() * sizeof(Candidate);
+    return links_.size() * sizeof(Link) + empty_.size() * sizeof(Candidate);
   }
 
  private:
@@ -100,7 +100,8 @@ class LinkRefinement {
   template <typename Again>
   std::vector<Candidate> take(const Again& again);
   std::vector<std::uint8_t> nodes_with(const std::vector<bool>& patches) const;
-  void decide(const std::vector<Candidate>& generation, std::vector<Outcome>& outcomes,
+  void append(std::vector<std::vector<Link>> made);
+  void decide(std::span<const Candidate> generation, std::vector<Outcome>& outcomes,
               const Progress& progress);
   Outcome decide(const Candidate& pair, Scratch& scratch) const;
   Outcome link_patches(const Candidate& pair) const;
@@ -112,8 +113,8 @@ class LinkRefinement {
   Outcome split(const Candidate& pair, View view) const;
   double weight_squared(const Candidate& pair) const;
   double allowed_squared(const Candidate& pair) const;
-  std::vector<Candidate> merge(const std::vector<Candidate>& generation,
-                               const std::vector<Outcome>& outcomes);
+  void merge(std::span<const Candidate> generation, const std::vector<Outcome>& outcomes,
+             std::vector<Link>& links, std::vector<Candidate>& next);
   double part_of_pairs(const Candidate& pair) const;
   void append_children(const Candidate& pair, const Outcome& outcome,
                        std::vector<Candidate>& next) const;

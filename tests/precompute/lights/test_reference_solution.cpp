@@ -174,60 +174,9 @@ TEST(ReferenceSolution, SolvesOnCompressedFormFactorsToSinglePrecision) {
   }
 }
 
-/// An operator that gives every patch so many times its own light.
-class Multiple final : public TransferOperator {
- public:
-  Multiple(std::size_t patch_count, float factor) : patch_count_(patch_count), factor_(factor) {}
-
-  std::size_t patch_count() const override { return patch_count_; }
-  std::size_t bytes() const override { return sizeof(float); }
-  OperatorKind kind() const override { return OperatorKind::kNoOperator; }
-  std::size_t workspace_size() const override { return 0; }
-  void do_apply(std::span<const Float3> initial_exitance, std::span<Float3> indirect_irradiance,
-                std::span<float>, const Scheduler&) const override {
-    for (std::size_t i = 0; i < patch_count_; ++i) {
-      for (int c = 0; c < kChannelCount; ++c) {
-        indirect_irradiance[i][c] = factor_ * initial_exitance[i][c];
-      }
-    }
-  }
-
- private:
-  std::size_t patch_count_;
-  float factor_;
-};
-
-TEST(ReferenceSolution, IsTheSameWithAnyPreconditioner) {
-  const Room room({0.9F, 0.5F, 0.1F});
-  PatchTable darker = room.patches;
-  darker.reflectance.assign(darker.size(), {0.6F, 0.6F, 0.6F});
-  const std::size_t n = room.patches.size();
-  const auto lights = room.lights(ReferenceSolver::kBatchLights + 1);
-  const ReferenceSolver plain(room.exchange, room.patches);
-  const auto truths = plain.radiosities(lights, 1e-12);
-  const std::shared_ptr<const TransferOperator> operators[] = {
-      build_dense_transfer(room.exchange, room.patches, Precision::kF32),
-      build_dense_transfer(room.exchange, darker, Precision::kF16),
-      std::make_shared<Multiple>(n, 0.5F),
-      // Not positive: it is given up.
-      std::make_shared<Multiple>(n, -10.0F)};
-  for (const auto& nearly_inverse : operators) {
-    const auto found = plain.preconditioned(nearly_inverse).radiosities(lights, 1e-12);
-    for (std::size_t k = 0; k < lights.size(); ++k) {
-      EXPECT_LE(room.residual(lights[k], found[k]), 1.01e-12);
-      for (std::size_t i = 0; i < n; ++i) {
-        for (int c = 0; c < kChannelCount; ++c) ASSERT_NEAR(found[k][i][c], truths[k][i][c], 1e-9);
-      }
-    }
-  }
-  EXPECT_THROW(plain.preconditioned(std::make_shared<Multiple>(n + 1, 0.0F)), Error);
-}
-
 TEST(ReferenceSolution, WhatArrivesIsAsExactOfALightOfWhichLittleDoes) {
   const Room room({0.7F, 0.5F, 0.9F});
-  const ReferenceSolver plain(room.exchange, room.patches);
-  const ReferenceSolver preconditioned =
-      plain.preconditioned(build_dense_transfer(room.exchange, room.patches, Precision::kF16));
+  const ReferenceSolver solver(room.exchange, room.patches);
   // The second shines on a patch of which hardly any light gets away.
   auto lights = room.lights(3);
   const FormFactorRows rows(room.exchange, room.patches.area);
@@ -243,18 +192,16 @@ TEST(ReferenceSolution, WhatArrivesIsAsExactOfALightOfWhichLittleDoes) {
   }
   lights[1].assign(room.patches.size(), {0, 0, 0});
   lights[1][closed] = {1, 1, 1};
-  const auto truths = plain.indirect_irradiances(lights, 1e-13);
-  for (const ReferenceSolver* solver : {&plain, &preconditioned}) {
-    for (const double residual : {1e-2, 1e-5}) {
-      const auto found = solver->indirect_irradiances(lights, 0, residual);
-      for (std::size_t k = 0; k < lights.size(); ++k) {
-        // (I - rho F)^-1 amplifies what is left by 1 / (1 - 0.9) at most.
-        EXPECT_LE(relative_difference(found[k], truths[k], room.patches.area), 10 * residual)
-            << "light " << k;
-      }
+  const auto truths = solver.indirect_irradiances(lights, 1e-13);
+  for (const double residual : {1e-2, 1e-5}) {
+    const auto found = solver.indirect_irradiances(lights, 0, residual);
+    for (std::size_t k = 0; k < lights.size(); ++k) {
+      // (I - rho F)^-1 amplifies what is left by 1 / (1 - 0.9) at most.
+      EXPECT_LE(relative_difference(found[k], truths[k], room.patches.area), 10 * residual)
+          << "light " << k;
     }
   }
-  const auto dark = plain.indirect_irradiances(
+  const auto dark = solver.indirect_irradiances(
       std::vector(1, std::vector<Float3>(room.patches.size(), Float3{0, 0, 0})), 0, 1e-3);
   for (const Float3& h : dark.front()) EXPECT_EQ(h, (Float3{0, 0, 0}));
 }

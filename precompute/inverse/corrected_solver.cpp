@@ -1,0 +1,122 @@
+#include "precompute/inverse/corrected_solver.h"
+
+#include <algorithm>
+#include <array>
+
+#include "precompute/base/ranks.h"
+#include "precompute/lights/reference_solution.h"
+#include "precompute/lights/solve_batches.h"
+#include "transfer/base/area_norm.h"
+#include "transfer/base/reflection.h"
+
+namespace rebounce {
+namespace {
+
+using Lights = CorrectedSolver::Lights;
+
+// Rounds after which a light is left to ReferenceSolver: each usually leaves a thousandth of the
+// error. The residual that it solves to where nearly no light arrives, relative to what is emitted.
+constexpr int kMostRounds = 4;
+constexpr double kLeastResidual = 1e-10;
+
+// Lights that one gather along the links takes: their sums just fill the registers.
+constexpr std::size_t kGathered = 8, kRows = kGathered * kChannelCount;
+
+void add(std::span<const Float3> values, float factor, std::span<Float3> sum) {
+  for (std::size_t i = 0; i < sum.size(); ++i) {
+    for (int c = 0; c < kChannelCount; ++c) sum[i][c] += factor * values[i][c];
+  }
+}
+
+}  // namespace
+
+/// F times radiosities, along the links.
+Lights CorrectedSolver::gather(const Lights& radiosities) const {
+  using Columns = std::array<float, kRows>;
+  const std::size_t n = patches_.size();
+  const Ranks ranks;
+  Lights gathered(radiosities.size());
+  std::vector<Columns> from(n), to(n);
+  for (std::size_t begin = 0; begin < radiosities.size(); begin += kGathered) {
+    if (!ranks.makes(begin, kGathered)) continue;
+    const std::size_t count = std::min(kGathered, radiosities.size() - begin);
+    for (std::size_t i = 0; i < n; ++i) {
+      from[i] = {};
+      for (std::size_t k = 0; k < count; ++k) {
+        std::ranges::copy(radiosities[begin + k][i], from[i].begin() + k * kChannelCount);
+      }
+    }
+    links_->gather(std::span<const Columns>(from), std::span(to));
+    for (std::size_t k = 0; k < count; ++k) {
+      std::vector<Float3>& light = gathered[begin + k];
+      light.resize(n);
+      for (std::size_t i = 0; i < n; ++i) {
+        std::copy_n(to[i].begin() + k * kChannelCount, kChannelCount, light[i].begin());
+      }
+    }
+  }
+  ranks.share(std::span(gathered), kGathered);
+  return gathered;
+}
+
+Lights CorrectedSolver::indirect_irradiances(std::span<const std::vector<Float3>> initial_exitances,
+                                             double residual) const {
+  Lights result = compressed_.indirect_irradiances(initial_exitances);
+  std::vector<Open> open;
+  for (std::size_t k = 0; k < result.size(); ++k) {
+    open.push_back({k, area_norm(result[k], patches_.area)});
+  }
+  for (int round = 0; round < kMostRounds && !open.empty(); ++round) {
+    const Lights corrected = correct(initial_exitances, result, open);
+    std::vector<Open> left;
+    for (std::size_t k = 0; k < open.size(); ++k) {
+      std::vector<Float3>& light = result[open[k].light];
+      add(corrected[k], -1, light);
+      const double change = area_norm(light, patches_.area);
+      light = corrected[k];
+      // What is left is the same part of this change as it is of the last one.
+      const double allowed = residual * area_norm(light, patches_.area);
+      if (change * change > allowed * open[k].last_change) left.push_back({open[k].light, change});
+    }
+    open = std::move(left);
+  }
+  solve_along_links(initial_exitances, open, residual, result);
+  return result;
+}
+
+/// The irradiances of the lights that are `open`, after one more round.
+Lights CorrectedSolver::correct(std::span<const std::vector<Float3>> initial_exitances,
+                                const Lights& irradiances, std::span<const Open> open) const {
+  // H = F (M0 + rho H). With h = F (M0 + rho H0) and d = h - H0, H = h + Y rho d.
+  Lights radiosities;
+  for (const Open& o : open) {
+    std::vector<Float3>& b = radiosities.emplace_back(irradiances[o.light]);
+    reflect(patches_.reflectance, b);
+    add(initial_exitances[o.light], 1, b);
+  }
+  Lights result = gather(radiosities);
+  Lights& reflected = radiosities;
+  for (std::size_t k = 0; k < open.size(); ++k) {
+    reflected[k] = result[k];
+    add(irradiances[open[k].light], -1, reflected[k]);
+    reflect(patches_.reflectance, reflected[k]);
+  }
+  const Lights corrections = compressed_.indirect_irradiances(reflected);
+  for (std::size_t k = 0; k < open.size(); ++k) add(corrections[k], 1, result[k]);
+  return result;
+}
+
+void CorrectedSolver::solve_along_links(std::span<const std::vector<Float3>> initial_exitances,
+                                        std::span<const Open> open, double residual,
+                                        Lights& irradiances) const {
+  if (open.empty()) return;
+  Lights left;
+  for (const Open& o : open) left.push_back(initial_exitances[o.light]);
+  const ReferenceSolver solver(links_, patches_);
+  Lights solved = solve_batches(left, {}, [&](std::span<const std::vector<Float3>> some) {
+    return solver.indirect_irradiances(some, kLeastResidual, residual);
+  });
+  for (std::size_t k = 0; k < open.size(); ++k) irradiances[open[k].light] = std::move(solved[k]);
+}
+
+}  // namespace rebounce

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "precompute/inverse/solved_transfer.h"
+#include "transfer/exchange/linked_form_factors.h"
+#include "transfer/file/transfer_data.h"
+
+namespace rebounce {
+
+/// Finds the light of links by iterative refinement (J. H. Wilkinson, "Rounding errors in algebraic
+/// processes", 1963). A solution with compressed form factors is off by what these are off; one
+/// gather along the links tells the residual, and the light of the residual, with compressed form
+/// factors again, is the correction. Each round takes the error to the part of itself that
+/// compressed form factors are off, some thousandth, so that one is enough where conjugate
+/// gradients along the links gather three times. The few lights for which it is not, for instance
+/// of lamps in nooks, are left to ReferenceSolver.
+class CorrectedSolver {
+ public:
+  using Lights = std::vector<std::vector<Float3>>;  ///< [lights][n]
+
+  /// `compressed` and `patches` must outlive the object.
+  CorrectedSolver(const SolvedTransfer& compressed, std::shared_ptr<const LinkedFormFactors> links,
+                  const PatchTable& patches)
+      : compressed_(compressed), links_(std::move(links)), patches_(patches) {}
+
+  /// The indirect irradiances of `initial_exitances` by the links, in lx, off by at most `residual`
+  /// of themselves, as the last correction lets expect; gathers in single precision. All ranks call
+  /// it together. The bits do not depend on threads or ranks.
+  Lights indirect_irradiances(std::span<const std::vector<Float3>> initial_exitances,
+                              double residual) const;
+
+ private:
+  /// A light that is still to be solved for.
+  struct Open {
+    std::size_t light;   ///< its place among all
+    double last_change;  ///< area norm of what the last round has changed
+  };
+
+  Lights gather(const Lights& radiosities) const;
+  Lights correct(std::span<const std::vector<Float3>> initial_exitances, const Lights& irradiances,
+                 std::span<const Open> open) const;
+  void solve_along_links(std::span<const std::vector<Float3>> initial_exitances,
+                         std::span<const Open> open, double residual, Lights& irradiances) const;
+
+  const SolvedTransfer& compressed_;
+  std::shared_ptr<const LinkedFormFactors> links_;
+  const PatchTable& patches_;
+};
+
+}  // namespace rebounce
