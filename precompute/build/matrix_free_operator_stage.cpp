@@ -190,7 +190,7 @@ class LinkedOperator {
 
   /// Measures the error of the operator under lights of this `seed`.
   void check(std::uint64_t seed) {
-    const CorrectedSolver solver(solved_->solved(), links_, data_.patches);
+    const CorrectedSolver solver(solved_->solved(), links_, data_.patches, data_.transfer);
     const auto truth_of = [&](Exitances some) {
       return solver.indirect_irradiances(some, reference_residual(decided_.tolerance));
     };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "precompute/base/ranks.h"
 #include "precompute/lights/reference_solution.h"
@@ -29,6 +30,30 @@ void add(std::span<const Float3> values, float factor, std::span<Float3> sum) {
 }
 
 }  // namespace
+
+CorrectedSolver::CorrectedSolver(const SolvedTransfer& compressed,
+                                 std::shared_ptr<const LinkedFormFactors> links,
+                                 const PatchTable& patches,
+                                 std::shared_ptr<const TransferOperator> nearly_inverse)
+    : compressed_(compressed), links_(std::move(links)), patches_(patches) {
+  if (nearly_inverse != nullptr && nearly_inverse->roles().all_are_both()) {
+    nearly_inverse_ = std::move(nearly_inverse);
+  }
+}
+
+Lights CorrectedSolver::first_guess(std::span<const std::vector<Float3>> initial_exitances) const {
+  if (nearly_inverse_ == nullptr) return compressed_.indirect_irradiances(initial_exitances);
+  Lights guess(initial_exitances.size(), std::vector<Float3>(patches_.size()));
+#pragma omp parallel
+  {
+    std::vector<float> workspace(nearly_inverse_->workspace_size());
+#pragma omp for schedule(dynamic, 1)
+    for (std::size_t k = 0; k < guess.size(); ++k) {
+      nearly_inverse_->apply(initial_exitances[k], guess[k], workspace);
+    }
+  }
+  return guess;
+}
 
 /// F times radiosities, along the links.
 Lights CorrectedSolver::gather(const Lights& radiosities) const {
@@ -61,7 +86,7 @@ Lights CorrectedSolver::gather(const Lights& radiosities) const {
 
 Lights CorrectedSolver::indirect_irradiances(std::span<const std::vector<Float3>> initial_exitances,
                                              double residual) const {
-  Lights result = compressed_.indirect_irradiances(initial_exitances);
+  Lights result = first_guess(initial_exitances);
   std::vector<Open> open;
   for (std::size_t k = 0; k < result.size(); ++k) {
     open.push_back({k, area_norm(result[k], patches_.area)});

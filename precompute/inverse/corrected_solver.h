@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <memory>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "precompute/inverse/solved_transfer.h"
@@ -13,20 +12,21 @@
 namespace rebounce {
 
 /// Finds the light of links by iterative refinement (J. H. Wilkinson, "Rounding errors in algebraic
-/// processes", 1963). A solution with compressed form factors is off by what these are off; one
-/// gather along the links tells the residual, and the light of the residual, with compressed form
-/// factors again, is the correction. Each round takes the error to the part of itself that
-/// compressed form factors are off, some thousandth, so that one is enough where conjugate
-/// gradients along the links gather three times. The few lights for which it is not, for instance
-/// of lamps in nooks, are left to ReferenceSolver.
+/// processes", 1963). A first guess is off by some thousandths. One gather along the links tells
+/// the residual, and the light of the residual with compressed form factors is the correction. Each
+/// round takes the error to a part of itself that is no larger than that of the guess, so that one
+/// is enough where conjugate gradients along the links gather three times. The few lights for which
+/// it is not, for instance of lamps in nooks, are left to ReferenceSolver.
 class CorrectedSolver {
  public:
   using Lights = std::vector<std::vector<Float3>>;  ///< [lights][n]
 
-  /// `compressed` and `patches` must outlive the object.
+  /// The first guess is that of `nearly_inverse`, an operator that was made from `compressed`; with
+  /// a null pointer, and of one with roles, that of `compressed` itself. `compressed` and `patches`
+  /// must outlive the object.
   CorrectedSolver(const SolvedTransfer& compressed, std::shared_ptr<const LinkedFormFactors> links,
-                  const PatchTable& patches)
-      : compressed_(compressed), links_(std::move(links)), patches_(patches) {}
+                  const PatchTable& patches,
+                  std::shared_ptr<const TransferOperator> nearly_inverse = {});
 
   /// The indirect irradiances of `initial_exitances` by the links, in lx, off by at most `residual`
   /// of themselves, as the last correction lets expect; gathers in single precision. All ranks call
@@ -41,6 +41,7 @@ class CorrectedSolver {
     double last_change;  ///< area norm of what the last round has changed
   };
 
+  Lights first_guess(std::span<const std::vector<Float3>> initial_exitances) const;
   Lights gather(const Lights& radiosities) const;
   Lights correct(std::span<const std::vector<Float3>> initial_exitances, const Lights& irradiances,
                  std::span<const Open> open) const;
@@ -50,6 +51,7 @@ class CorrectedSolver {
   const SolvedTransfer& compressed_;
   std::shared_ptr<const LinkedFormFactors> links_;
   const PatchTable& patches_;
+  std::shared_ptr<const TransferOperator> nearly_inverse_;  ///< may be null
 };
 
 }  // namespace rebounce

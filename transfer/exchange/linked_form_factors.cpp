@@ -46,6 +46,11 @@ IncomingLink seen_from(std::uint32_t node, const FormFactorLinks& links, std::ui
   return {of_a, of_b, a, exchange};
 }
 
+/// Which gradients a link has.
+int gradients_of(const IncomingLink& link) {
+  return (has_gradient(link.gradient_from) ? 2 : 0) + (has_gradient(link.gradient_to) ? 1 : 0);
+}
+
 /// Checks that the nodes are in order of levels, that siblings are neighbours, and that the
 /// children of a node together have as many patches as the node.
 void check_tree(const FormFactorLinks& links, std::size_t n) {
@@ -227,7 +232,8 @@ void LinkedFormFactors::Tree::find_levels() {
   }
 }
 
-/// Sorts the links by the node that gathers: each link once for each of its two nodes.
+/// Sorts the links by the node that gathers, each link once for each of its two nodes, and those of
+/// a node by the gradients that they have.
 void LinkedFormFactors::Tree::sort_links(const FormFactorLinks& links) {
   const LinksByNode of_node =
       links_by_node(node_.size(), links.pair.size(), [&](std::size_t k) { return links.pair[k]; });
@@ -237,6 +243,11 @@ void LinkedFormFactors::Tree::sort_links(const FormFactorLinks& links) {
     for (const std::uint32_t link : of_node[node]) {
       incoming_.push_back(seen_from(node, links, link));
     }
+    const auto first = static_cast<std::ptrdiff_t>(incoming_begin_[node]);
+    std::stable_sort(incoming_.begin() + first, incoming_.end(),
+                     [](const IncomingLink& a, const IncomingLink& b) {
+                       return gradients_of(a) < gradients_of(b);
+                     });
   }
 }
 

@@ -13,7 +13,9 @@ static inline void add_scaled(Lanes& to, float factor, const Lanes& from) {
   for (std::size_t lane = 0; lane < to.size(); ++lane) to[lane] += factor * from[lane];
 }
 
-/// GatherAlongLinks in plain C++, for any number type and number of channels.
+/// GatherAlongLinks in plain C++, for any number type and number of channels. Moments of many
+/// channels come from memory, so they are left alone where a single patch, which has none, is at
+/// one end; links of the same kind are next to each other.
 template <typename Lanes>
 static inline LinkLightOf<Lanes> gather_along_links(const IncomingLink* link, std::size_t count,
                                                     const LinkLightOf<Lanes>* light) {
@@ -21,9 +23,15 @@ static inline LinkLightOf<Lanes> gather_along_links(const IncomingLink* link, st
   for (std::size_t l = 0; l < count; ++l) {
     const LinkLightOf<Lanes>& from = light[link[l].from];
     add_scaled(sum.mean, link[l].exchange_area, from.mean);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      add_scaled(sum.mean, bfloat16_to_float(link[l].gradient_from[axis]), from.first[axis]);
-      add_scaled(sum.first[axis], bfloat16_to_float(link[l].gradient_to[axis]), from.mean);
+    if (has_gradient(link[l].gradient_from)) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        add_scaled(sum.mean, bfloat16_to_float(link[l].gradient_from[axis]), from.first[axis]);
+      }
+    }
+    if (has_gradient(link[l].gradient_to)) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        add_scaled(sum.first[axis], bfloat16_to_float(link[l].gradient_to[axis]), from.mean);
+      }
     }
   }
   return sum;

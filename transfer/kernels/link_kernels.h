@@ -16,6 +16,11 @@ struct IncomingLink {
 };
 static_assert(sizeof(IncomingLink) == 20);
 
+/// Whether a gradient of an IncomingLink is not 0.
+constexpr bool has_gradient(const std::array<std::uint16_t, 3>& gradient) {
+  return (gradient[0] | gradient[1] | gradient[2]) != 0;
+}
+
 // Three colour channels and one unused float, so that a colour is a vector.
 inline constexpr std::size_t kColorLanes = 4;
 using ColorLanes = std::array<float, kColorLanes>;

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "precompute/compression/form_factor_compression.h"
+#include "precompute/compression/matrix_free_transfer.h"
 #include "precompute/exchange/links/links.h"
 #include "precompute/lights/reference_solution.h"
 #include "tests/support/test_scenes.h"
@@ -77,6 +78,22 @@ TEST_F(CorrectedSolverOfRoom, FindsTheLightOfTheLinks) {
       EXPECT_GT(error(compressed[k], truths[k]), 2e-4) << "nothing to correct in light " << k;
     }
     for (const Float3& h : found.back()) ASSERT_EQ(h, (Float3{0, 0, 0}));
+  }
+}
+
+TEST_F(CorrectedSolverOfRoom, MayBeginWithAnOperator) {
+  const Lights exitances = lights(9, 5), some = lights(48, 6);
+  const std::shared_ptr<const TransferOperator> nearly = build_matrix_free_transfer(
+      *form_factors_, patches(), {std::span(some).first(32), std::span(some).last(16)},
+      {.compression = {.tolerance = 0.03}});
+  const Lights truths = ReferenceSolver(links_, patches()).indirect_irradiances(exitances, 1e-12);
+  for (const double residual : {1e-2, 1e-5}) {
+    const Lights found = CorrectedSolver(*solved_, links_, patches(), nearly)
+                             .indirect_irradiances(exitances, residual);
+    for (std::size_t k = 0; k + 1 < found.size(); ++k) {
+      EXPECT_LT(error(found[k], truths[k]), residual) << "light " << k;
+      EXPECT_GT(error(product(*nearly, exitances[k]), truths[k]), 2e-3) << "light " << k;
+    }
   }
 }
 
