@@ -23,7 +23,8 @@ namespace rebounce {
 /// differs from H by P r with P = (I - F rho)^-1. Rays into the hemispheres of some patches
 /// estimate r without bias: the mean of B where they end, less H, divided by the probability that
 /// the patch is among them (D. G. Horvitz and D. J. Thompson, "A generalization of sampling without
-/// replacement from a finite universe", 1952). This is done kGroups times, with patches and rays
+/// replacement from a finite universe", 1952). Where few patches receive most of the light of a
+/// lamp, these are surely among them. This is done kGroups times, with patches and rays
 /// that are independent of each other. The product of what two groups say of P r is an estimate
 /// without bias of its squared norm, to which the noise of neither adds. P is applied along the
 /// links, which changes the norm by as little as they are off. The confidence is that of a
@@ -72,6 +73,7 @@ class WholeErrorEstimator {
   /// Of each patch of a group.
   using MetRows = std::vector<std::vector<MetPatch>>;
 
+  void choose_patches();
   MetRows trace(std::size_t group, std::span<const std::uint32_t> shown_patch,
                 const RayTracer& tracer, const Progress& progress) const;
   MetRows met_by(std::size_t group, const MetRows& met, std::span<const std::uint32_t> row) const;
@@ -85,9 +87,11 @@ class WholeErrorEstimator {
   const TransferData& data_;
   PatchRoles roles_;
   std::uint64_t seed_;
-  int ray_count_;
+  Sample sample_;
+  std::vector<double> probability_;                        ///< [n] with which a patch is in a group
   std::array<std::vector<std::uint32_t>, kGroups> patch_;  ///< of each group, ascending
-  std::vector<std::vector<Float3>> radiosity_;             ///< of each light, until rays are traced
+  /// Of each light, until rays are traced.
+  std::vector<std::vector<Float3>> radiosity_, irradiance_;
   std::vector<std::vector<Float3>>
       compression_;  ///< of each light: operator less links, at receivers
   std::array<std::vector<std::vector<Float3>>, kGroups> residual_;  ///< [group][patch][light]
