@@ -51,8 +51,8 @@ constexpr std::size_t kThreadBytesOfPatch = 5'000, kMostThreadBytes = 10'000'000
 // Copies of the factors of a low-rank operator while they are found.
 constexpr std::size_t kFactorCopies = 6;
 
-// A link during refinement: the link, its copy, and what its rays are counted in
-// or the flat arrays.
+// A link during refinement: the link, its copy, and what its rays are counted in or the flat
+// arrays.
 constexpr std::size_t kLinkBytesFound = 140;
 // A patch then, as from pairs.
 constexpr std::size_t kPatchBytesOfLinks = 17'500;

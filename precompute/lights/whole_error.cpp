@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include "precompute/base/parallel_progress.h"
@@ -21,8 +20,8 @@ constexpr std::size_t kGroups = WholeErrorEstimator::kGroups;
 // The quantile at 97.5 % of Student's distribution with kGroups - 1 = 3 degrees of freedom.
 constexpr double kStudent = 3.182;
 
-// Rays of a group, and of a patch of it at most (lab/111).
-constexpr std::size_t kRaysOfGroup = 1 << 23, kMostRays = 4096;
+// Rays of a group, and of a patch of it (lab/111, lab/133).
+constexpr double kRaysOfGroup = 1 << 23, kLeastRays = 512, kMostRays = 4096;
 
 // Lights whose groups are spread together.
 constexpr std::size_t kLightsAtOnce = 16;
@@ -87,51 +86,13 @@ SampledError error_over_lights(const std::vector<Replicates>& lights, const Refe
           std::hypot(largest.confidence(), largest.all * largest.all)};
 }
 
-/// Adds to `share` [n] the parts of the energy of a light that are on each patch, times `weight`.
-void add_energy(std::span<const Float3> light, std::span<const float> area, double weight,
-                std::span<double> share) {
-  double all = 0;
-  const auto energy = [&](std::size_t i) {
-    const auto& [r, g, b] = light[i];
-    return area[i] *
-           (static_cast<double>(r) * r + static_cast<double>(g) * g + static_cast<double>(b) * b);
-  };
-  for (std::size_t i = 0; i < share.size(); ++i) all += energy(i);
-  if (!(all > 0)) return;
-  for (std::size_t i = 0; i < share.size(); ++i) share[i] += weight * energy(i) / all;
-}
-
-/// Probabilities in proportion to `share` [n], at most 1, that add up to `count`.
-std::vector<double> probabilities(std::span<const double> share, double count) {
-  std::vector<double> probability(share.size(), 0.0);
-  double left = count, rest = std::accumulate(share.begin(), share.end(), 0.0);
-  for (bool capped = true; capped;) {
-    capped = false;
-    const double factor = left / rest;
-    for (std::size_t i = 0; i < share.size(); ++i) {
-      if (probability[i] == 1) continue;
-      probability[i] = factor * share[i];
-      if (probability[i] < 1) continue;
-      probability[i] = 1;
-      left -= 1;
-      rest -= share[i];
-      capped = true;
-    }
-  }
-  return probability;
-}
-
-/// Numbers that are chosen with these probabilities, one in each run over which they add up to 1
-/// (W. G. Madow, "On the theory of systematic sampling, II", 1949).
-std::vector<std::uint32_t> systematic_sample(std::span<const double> probability,
-                                             std::uint64_t bits) {
+/// `count` of `all` numbers, one in each of as many equal runs.
+std::vector<std::uint32_t> spread_choice(std::size_t count, std::size_t all, std::uint64_t bits) {
+  const double start = unit_square(bits).x;
   std::vector<std::uint32_t> chosen;
-  double before = 0, next = unit_square(bits).x;
-  for (std::uint32_t i = 0; i < probability.size(); ++i) {
-    before += probability[i];
-    if (before <= next) continue;
-    chosen.push_back(i);
-    next += 1;
+  for (std::size_t k = 0; k < count; ++k) {
+    const double place = (static_cast<double>(k) + start) / static_cast<double>(count);
+    chosen.push_back(static_cast<std::uint32_t>(place * static_cast<double>(all)));
   }
   return chosen;
 }
@@ -157,37 +118,19 @@ void add_to(std::span<Float3> sum, std::span<const Float3> values, float weight 
 
 WholeErrorEstimator::WholeErrorEstimator(const TransferData& data, const PatchRoles& roles,
                                          std::uint64_t seed, const Sample& sample)
-    : data_(data), roles_(roles), seed_(mix_bits(seed)), sample_(sample) {}
-
-/// A third of the patches of a group are anywhere, a third where the lights arrive, and a third
-/// where they leave: rays between two patches of a group count from both sides.
-void WholeErrorEstimator::choose_patches() {
-  const std::size_t n = data_.patches.size(), lights = irradiance_.size();
-  std::vector<double> share(n, 1 / static_cast<double>(n));
-  for (std::size_t l = 0; l < lights; ++l) {
-    add_energy(irradiance_[l], data_.patches.area, 1 / static_cast<double>(lights), share);
-    add_energy(radiosity_[l], data_.patches.area, 1 / static_cast<double>(lights), share);
-  }
-  probability_ = sample_.patch_count < n
-                     ? probabilities(share, static_cast<double>(sample_.patch_count))
-                     : std::vector<double>(n, 1.0);
+    : data_(data), roles_(roles), seed_(mix_bits(seed)), ray_count_(sample.ray_count) {
+  const std::size_t n = data.patches.size();
   for (std::size_t g = 0; g < kGroups; ++g) {
-    patch_[g] = systematic_sample(probability_, mix_bits(seed_ + g));
+    patch_[g] = spread_choice(std::min(n, sample.patch_count), n, mix_bits(seed_ + g));
     residual_[g].resize(patch_[g].size());
-    for (std::size_t k = 0; k < patch_[g].size(); ++k) {
-      for (const std::vector<Float3>& light : irradiance_) {
-        const auto& [r, green, b] = light[patch_[g][k]];
-        residual_[g][k].push_back({-r, -green, -b});
-      }
-    }
   }
-  irradiance_ = {};
 }
 
 WholeErrorEstimator::Sample WholeErrorEstimator::sample_for(std::size_t patch_count, double part) {
   Sample sample;
   const auto patches = static_cast<double>(std::min(patch_count, sample.patch_count));
-  sample.ray_count = static_cast<int>(std::min<double>(part * kRaysOfGroup / patches, kMostRays));
+  sample.ray_count =
+      static_cast<int>(std::clamp(part * kRaysOfGroup / patches, part * kLeastRays, kMostRays));
   return sample;
 }
 
@@ -204,7 +147,12 @@ void WholeErrorEstimator::add(std::span<const Float3> initial_exitance,
   for (std::size_t i = 0; i < patches.size(); ++i) {
     for (int c = 0; c < kChannelCount; ++c) compression[i][c] -= received[i][c];
   }
-  irradiance_.emplace_back(truth.begin(), truth.end());
+  for (std::size_t g = 0; g < kGroups; ++g) {
+    for (std::size_t k = 0; k < patch_[g].size(); ++k) {
+      const auto& [r, green, b] = truth[patch_[g][k]];
+      residual_[g][k].push_back({-r, -green, -b});
+    }
+  }
 }
 
 /// The patches that the rays of each patch of a group met.
@@ -225,7 +173,7 @@ WholeErrorEstimator::MetRows WholeErrorEstimator::trace(std::size_t group,
     for (std::size_t k = 0; k < rows; ++k) {
       if (loop.stopped() || !ranks.makes(k)) continue;
       const std::uint32_t i = patch_[group][k];
-      measure_escape(data_.mesh, shown_patch, triangles[i], i, tracer, sample_.ray_count,
+      measure_escape(data_.mesh, shown_patch, triangles[i], i, tracer, ray_count_,
                      mix_bits(seed_ + kGroups + group), scratch);
       met[k] = counter.count(n, scratch.met);
       loop.advance();
@@ -266,7 +214,7 @@ void WholeErrorEstimator::add_gathered(std::size_t group, const MetRows& met,
     const std::uint32_t i = patch_[group][k];
     const auto add = [&](const MetPatch& m, float part) {
       add_to(residual_[group][k], by_patch.subspan(m.patch * lights, lights),
-             part * static_cast<float>(m.count) / static_cast<float>(sample_.ray_count));
+             part * static_cast<float>(m.count) / static_cast<float>(ray_count_));
     };
     const auto share = [&](std::uint32_t j) { return area[j] / (area[i] + area[j]); };
     for (const MetPatch& m : met[k]) add(m, row[m.patch] == kNone ? 1 : share(m.patch));
@@ -293,12 +241,12 @@ void WholeErrorEstimator::gather(std::span<const std::uint32_t> shown_patch,
 
 /// What a group says of the residual, 0 at patches that are not in it.
 std::vector<Float3> WholeErrorEstimator::residual(std::size_t group, std::size_t light) const {
-  std::vector<Float3> result(data_.patches.size(), Float3{0, 0, 0});
-  for (std::size_t k = 0; k < patch_[group].size(); ++k) {
-    const std::uint32_t i = patch_[group][k];
-    const auto weight = static_cast<float>(1 / probability_[i]);
+  const std::size_t n = data_.patches.size(), count = patch_[group].size();
+  const float weight = static_cast<float>(n) / static_cast<float>(count);
+  std::vector<Float3> result(n, Float3{0, 0, 0});
+  for (std::size_t k = 0; k < count; ++k) {
     const auto& [r, g, b] = residual_[group][k][light];
-    result[i] = {weight * r, weight * g, weight * b};
+    result[patch_[group][k]] = {weight * r, weight * g, weight * b};
   }
   return result;
 }
@@ -342,7 +290,6 @@ WholeError WholeErrorEstimator::estimate(std::span<const std::uint32_t> shown_pa
                                          const Progress& progress) {
   const std::size_t lights = compression_.size();
   if (lights == 0) return {};
-  choose_patches();
   const Progress tracing = part_of(progress, 0, kTracingPart);
   gather(shown_patch, tracer, tracing);
   std::vector<Replicates> of_links, of_whole;

@@ -23,8 +23,7 @@ namespace rebounce {
 /// differs from H by P r with P = (I - F rho)^-1. Rays into the hemispheres of some patches
 /// estimate r without bias: the mean of B where they end, less H, divided by the probability that
 /// the patch is among them (D. G. Horvitz and D. J. Thompson, "A generalization of sampling without
-/// replacement from a finite universe", 1952). Where few patches receive most of the light of a
-/// lamp, these are surely among them. This is done kGroups times, with patches and rays
+/// replacement from a finite universe", 1952). This is done kGroups times, with patches and rays
 /// that are independent of each other. The product of what two groups say of P r is an estimate
 /// without bias of its squared norm, to which the noise of neither adds. P is applied along the
 /// links, which changes the norm by as little as they are off. The confidence is that of a
@@ -36,8 +35,8 @@ class WholeErrorEstimator {
 
   /// Patches and rays of each group.
   struct Sample {
-    std::size_t patch_count = 8192;  ///< at most; of scenes with fewer, all
-    int ray_count = 1024;            ///< of each of these patches
+    std::size_t patch_count = 65536;  ///< at most; of scenes with fewer, all
+    int ray_count = 1024;             ///< of each of these patches
   };
 
   /// The sample for so many patches: as many rays as memory and noise ask for, or a `part` of them.
@@ -73,7 +72,6 @@ class WholeErrorEstimator {
   /// Of each patch of a group.
   using MetRows = std::vector<std::vector<MetPatch>>;
 
-  void choose_patches();
   MetRows trace(std::size_t group, std::span<const std::uint32_t> shown_patch,
                 const RayTracer& tracer, const Progress& progress) const;
   MetRows met_by(std::size_t group, const MetRows& met, std::span<const std::uint32_t> row) const;
@@ -87,11 +85,9 @@ class WholeErrorEstimator {
   const TransferData& data_;
   PatchRoles roles_;
   std::uint64_t seed_;
-  Sample sample_;
-  std::vector<double> probability_;                        ///< [n] with which a patch is in a group
+  int ray_count_;
   std::array<std::vector<std::uint32_t>, kGroups> patch_;  ///< of each group, ascending
-  /// Of each light, until rays are traced.
-  std::vector<std::vector<Float3>> radiosity_, irradiance_;
+  std::vector<std::vector<Float3>> radiosity_;             ///< of each light, until rays are traced
   std::vector<std::vector<Float3>>
       compression_;  ///< of each light: operator less links, at receivers
   std::array<std::vector<std::vector<Float3>>, kGroups> residual_;  ///< [group][patch][light]

@@ -1,5 +1,6 @@
 #include "precompute/exchange/links/hemisphere_counts.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "precompute/base/parallel_progress.h"
@@ -68,16 +69,18 @@ void HemisphereCounts::trace(const Progress& progress) {
   share(Ranks(), escape_);
 }
 
-void HemisphereCounts::trace_further(std::span<const double> more, const Progress& progress) {
+bool HemisphereCounts::trace_further(std::span<const double> more, const Progress& progress) {
   std::vector<double> count(more.begin(), more.end());
   for (std::size_t i = 0; i < count.size(); ++i) {
     if (first_rays_ + count[i] <= rays_[i]) count[i] = 0;
     if (count[i] > 0) rays_[i] = first_rays_ + count[i];
   }
+  if (std::ranges::all_of(count, [](double c) { return c == 0; })) return false;
   trace(count, mix_bits(seed_), progress,
         [&](std::uint32_t i, const Escape&, std::span<const MetPatch> met) {
           further_[i] = pack(met);
         });
+  return true;
 }
 
 std::uint64_t HemisphereCounts::held_bytes() const {

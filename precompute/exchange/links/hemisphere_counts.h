@@ -26,8 +26,8 @@ class HemisphereCounts {
   void trace(const Progress& progress);
 
   /// Traces `more` [n] rays of each patch beside the first ones, where it has not as many already.
-  /// Throws Cancelled if `progress` asks to stop.
-  void trace_further(std::span<const double> more, const Progress& progress);
+  /// Returns false if all have. Throws Cancelled if `progress` asks to stop.
+  bool trace_further(std::span<const double> more, const Progress& progress);
 
   /// Calls `visit`(i, met) for each patch of this rank, with what its rays met, ascending; from
   /// several threads.

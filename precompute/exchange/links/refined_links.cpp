@@ -78,9 +78,8 @@ void RefinedLinks::measure(double epsilon, const Progress& progress) {
   LeafLinks leaves(tree_, geometry, links());
   leaves.count(hemispheres_);
   const CountedExchange first(geometry.areas(), hemispheres_.rays());
-  hemispheres_.trace_further(further_rays(leaves, first, epsilon, settings_.hemisphere_rays),
-                             part_of(progress, 0.0, 0.4));
-  leaves.count(hemispheres_);
+  const std::vector<double> more = further_rays(leaves, first, epsilon, settings_.hemisphere_rays);
+  if (hemispheres_.trace_further(more, part_of(progress, 0.0, 0.4))) leaves.count(hemispheres_);
   const CountedExchange counted(geometry.areas(), hemispheres_.rays());
   const PairExchange exchange(shadow_rays_, tracer_, counted, settings_);
   measuring_rays_ += leaves.measure(exchange, settings_.probe_rays, part_of(progress, 0.4, 1.0));
