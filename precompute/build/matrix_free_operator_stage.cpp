@@ -16,7 +16,6 @@
 #include "precompute/lights/fitting_lights.h"
 #include "precompute/lights/measured_error.h"
 #include "precompute/lights/reference_solution.h"
-#include "precompute/lights/solve_batches.h"
 #include "precompute/lights/whole_error.h"
 #include "transfer/base/area_norm.h"
 

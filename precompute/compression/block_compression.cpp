@@ -47,17 +47,16 @@ Spectrum gram_spectrum(const MatrixXd& a) {
   return descending(solver.eigenvectors(), solver.eigenvalues(), 0);
 }
 
-/// The two products with all of `a` are in single precision, which entries come in: a part of 1e-7
-/// of the energy does not matter to what is missing of it.
+/// The sample is in single precision, because any directions near the leading ones do; what is
+/// missing beside them is known exactly.
 Spectrum sketched_spectrum(const MatrixXd& a, Index sketch_size, std::uint64_t seed) {
-  const MatrixXf entries = a.cast<float>();
-  const MatrixXf sample = entries * random_signs(a.cols(), sketch_size, seed).cast<float>();
+  const MatrixXf signs = random_signs(a.cols(), sketch_size, seed).cast<float>();
+  const MatrixXf sample = a.cast<float>() * signs;
   const MatrixXd range = Eigen::HouseholderQR<MatrixXd>(sample.cast<double>()).householderQ() *
                          MatrixXd::Identity(a.rows(), sketch_size);
-  const MatrixXd projected = (range.cast<float>().transpose() * entries).cast<double>();
+  const MatrixXd projected = range.transpose() * a;
   Spectrum inner = gram_spectrum(projected);
-  const double all = entries.cast<double>().squaredNorm();
-  const double lost = std::max(0.0, all - projected.squaredNorm());
+  const double lost = std::max(0.0, a.squaredNorm() - projected.squaredNorm());
   for (double& missing : inner.missing) missing += lost;
   inner.directions = range * inner.directions;
   return inner;
