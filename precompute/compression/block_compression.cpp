@@ -14,7 +14,6 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-using Eigen::MatrixXf;
 
 // Columns of a sketch beyond the wanted rank; Halko et al. advise 5 to 10.
 constexpr Index kOversampling = 8;
@@ -47,12 +46,9 @@ Spectrum gram_spectrum(const MatrixXd& a) {
   return descending(solver.eigenvectors(), solver.eigenvalues(), 0);
 }
 
-/// The sample is in single precision, because any directions near the leading ones do; what is
-/// missing beside them is known exactly.
 Spectrum sketched_spectrum(const MatrixXd& a, Index sketch_size, std::uint64_t seed) {
-  const MatrixXf signs = random_signs(a.cols(), sketch_size, seed).cast<float>();
-  const MatrixXf sample = a.cast<float>() * signs;
-  const MatrixXd range = Eigen::HouseholderQR<MatrixXd>(sample.cast<double>()).householderQ() *
+  const MatrixXd sample = a * random_signs(a.cols(), sketch_size, seed);
+  const MatrixXd range = Eigen::HouseholderQR<MatrixXd>(sample).householderQ() *
                          MatrixXd::Identity(a.rows(), sketch_size);
   const MatrixXd projected = range.transpose() * a;
   Spectrum inner = gram_spectrum(projected);
