@@ -35,9 +35,9 @@ class LinkBuilder {
   LinkBuilder(const PatchModel& model, const RayTracer& tracer, const FormFactorSettings& settings,
               std::span<const float> weight = {});
 
-  /// The links for settings.link_epsilon, which must be above 0. When called again with a smaller
-  /// epsilon, links that are near enough stay, so that it takes a part of the time. Throws
-  /// Cancelled if `progress` asks to stop.
+  /// The links for `epsilon`, in place of settings.link_epsilon. When called again, links that are
+  /// near enough stay, so that it takes a part of the time. Throws Error if epsilon is not above 0
+  /// or not below the last one, Cancelled if `progress` asks to stop.
   LinkBuild build(double epsilon, const Progress& progress = {});
 
   /// Memory that is kept for finer links.

@@ -11,7 +11,6 @@
 
 #include "precompute/exchange/links/links.h"
 #include "precompute/exchange/pairs/form_factors.h"
-#include "precompute/inverse/dense_transfer.h"
 #include "rebounce/error.h"
 #include "tests/support/exchange_samples.h"
 #include "tests/support/test_scenes.h"
