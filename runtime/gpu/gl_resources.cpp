@@ -13,9 +13,9 @@ namespace {
 // Flags of errors that a context may hold at once; a lost one never runs out of them.
 constexpr int kMostErrors = 16;
 
-constexpr std::array<GlFunctions::Enum, GlTextureGuard::kUnits> kTextureTargets = {
+constexpr std::array<GlFunctions::Enum, GlTextureGuard::kKinds> kTextureTargets = {
     Gl::kTexture2D, Gl::kTextureArray, Gl::kTextureCube};
-constexpr std::array<GlFunctions::Enum, GlTextureGuard::kUnits> kTextureBindings = {
+constexpr std::array<GlFunctions::Enum, GlTextureGuard::kKinds> kTextureBindings = {
     Gl::kTexture2DBinding, Gl::kTextureArrayBinding, Gl::kTextureCubeBinding};
 
 template <typename GetLength, typename GetLog>
@@ -69,22 +69,32 @@ void GlStateGuard::put_back(GlFunctions::Enum target, unsigned index,
   }
 }
 
-GlTextureGuard::GlTextureGuard(const GlFunctions& gl) : gl_(gl) {
+GlTextureGuard::GlTextureGuard(const GlFunctions& gl, std::size_t slot_count)
+    : gl_(gl), slot_count_(static_cast<unsigned>(std::min<std::size_t>(slot_count, kSlots))) {
   gl_.get_integer(Gl::kActiveTexture, &active_);
-  for (unsigned k = 0; k < kUnits; ++k) {
-    gl_.active_texture(Gl::kTexture0 + kFirstUnit + k);
-    gl_.get_integer(kTextureBindings[k], &texture_[k]);
-    gl_.get_integer(Gl::kSamplerBinding, &sampler_[k]);
-  }
+  for_each_unit([&](unsigned kind, unsigned slot) {
+    gl_.get_integer(kTextureBindings[kind], &texture_[kind][slot]);
+    gl_.get_integer(Gl::kSamplerBinding, &sampler_[kind][slot]);
+  });
 }
 
 GlTextureGuard::~GlTextureGuard() {
-  for (unsigned k = 0; k < kUnits; ++k) {
-    gl_.active_texture(Gl::kTexture0 + kFirstUnit + k);
-    gl_.bind_texture(kTextureTargets[k], static_cast<unsigned>(texture_[k]));
-    gl_.bind_sampler(kFirstUnit + k, static_cast<unsigned>(sampler_[k]));
-  }
+  for_each_unit([&](unsigned kind, unsigned slot) {
+    gl_.bind_texture(kTextureTargets[kind], static_cast<unsigned>(texture_[kind][slot]));
+    gl_.bind_sampler(unit(kind, slot), static_cast<unsigned>(sampler_[kind][slot]));
+  });
   gl_.active_texture(static_cast<GlFunctions::Enum>(active_));
+}
+
+/// Calls work(kind, slot) with the unit active.
+template <typename Work>
+void GlTextureGuard::for_each_unit(const Work& work) const {
+  for (unsigned kind = 0; kind < kKinds; ++kind) {
+    for (unsigned slot = 0; slot < slot_count_; ++slot) {
+      gl_.active_texture(Gl::kTexture0 + unit(kind, slot));
+      work(kind, slot);
+    }
+  }
 }
 
 StorageBuffer::StorageBuffer(std::shared_ptr<const GlFunctions> gl, std::size_t size,

@@ -38,20 +38,30 @@ class GlStateGuard {
   Binding uniform_at_;
 };
 
-/// Puts back on destruction the textures and samplers at the units of shadow maps.
+/// Puts back on destruction the textures and samplers at the units of shadow maps: for each kind of
+/// texture (a plane, layers, a cube) a slot for each lamp that the shader takes at once.
 class GlTextureGuard {
  public:
-  static constexpr unsigned kFirstUnit = 10, kUnits = 3;
+  static constexpr unsigned kSlots = 4, kKinds = 3;
+  static constexpr unsigned unit(unsigned kind, unsigned slot) {
+    constexpr unsigned kFirst = 4;  // up to the last of the sixteen that every context has
+    return kFirst + kind * kSlots + slot;
+  }
 
-  explicit GlTextureGuard(const GlFunctions& gl);
+  /// For this many slots, kSlots at most.
+  GlTextureGuard(const GlFunctions& gl, std::size_t slot_count);
   ~GlTextureGuard();
   GlTextureGuard(const GlTextureGuard&) = delete;
   GlTextureGuard& operator=(const GlTextureGuard&) = delete;
 
  private:
+  template <typename Work>
+  void for_each_unit(const Work& work) const;
+
   const GlFunctions& gl_;
+  unsigned slot_count_;
   int active_ = 0;
-  std::array<int, kUnits> texture_{}, sampler_{};  ///< a plane, layers, a cube
+  std::array<std::array<int, kSlots>, kKinds> texture_{}, sampler_{};
 };
 
 /// A buffer object of ours. Its context is current while it is made and destroyed.

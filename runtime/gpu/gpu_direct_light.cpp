@@ -31,14 +31,28 @@ struct ViewBlock {
   Floats layer;
 };
 
-/// The uniform block of direct_light.glsl.
+constexpr std::size_t kLampsPerRun = GlTextureGuard::kSlots;
+
 struct LampBlock {
-  Words range{}, kind{};
+  Words kind{};
   Floats position{}, direction{}, color{}, depth_range{};
   std::array<ViewBlock, GpuLamp::kMostViews> views{};
 };
-// Between lamps: a multiple of the most that a context may ask for.
-constexpr std::size_t kLampStride = (sizeof(LampBlock) + 255) / 256 * 256;
+/// The uniform block of direct_light.glsl.
+struct RunBlock {
+  Words range{}, runs{};
+  std::array<LampBlock, kLampsPerRun> lamps{};
+};
+// Between runs: a multiple of the most that a context may ask for.
+constexpr std::size_t kRunStride = (sizeof(RunBlock) + 255) / 256 * 256;
+
+// Runs that do not wait for each other; the last of them adds what the others have written.
+constexpr std::size_t kRunsAtOnce = 4;
+
+/// Runs for this many lamps. Without lamps, one writes what others give.
+std::size_t runs_for(std::size_t lamp_count) {
+  return std::max<std::size_t>((lamp_count + kLampsPerRun - 1) / kLampsPerRun, 1);
+}
 
 enum class Before : std::uint8_t { kThisBuffer, kNothing, kOthers };
 
@@ -59,8 +73,9 @@ TextureKind texture_kind(GpuShadowMap map) {
   return {Gl::kTextureCube, Gl::kTextureCubeBinding};
 }
 
-unsigned unit_of(GpuShadowMap map) {
-  return GlTextureGuard::kFirstUnit + static_cast<unsigned>(map) - 1;
+/// The unit of the shadow map of a run's lamp `slot`.
+unsigned unit_of(GpuShadowMap map, std::size_t slot) {
+  return GlTextureGuard::unit(static_cast<unsigned>(map) - 1, static_cast<unsigned>(slot));
 }
 
 /// Whether depth falls with the distance from the lamp.
@@ -166,8 +181,10 @@ GpuDirectLight::GpuDirectLight(const std::shared_ptr<const GlFunctions>& gl,
       points_per_patch_(static_cast<std::size_t>(std::max(0, settings.points_per_patch))),
       program_(gl, "direct_light.glsl", ShaderSources::kDirectLight),
       points_(point_buffer(gl, data, settings)),
-      lamps_(gl, kLampStride * static_cast<std::size_t>(std::max(1, settings.light_capacity)),
-             nullptr) {
+      runs_(gl,
+            kRunStride * runs_for(static_cast<std::size_t>(std::max(1, settings.light_capacity))),
+            nullptr),
+      of_runs_(gl, kChannelCount * sizeof(float) * patch_count_ * (kRunsAtOnce - 1), nullptr) {
   gl_->gen_samplers(2, samplers_);
   for (int k = 0; k < 2; ++k) {
     const auto set = [&](GlFunctions::Enum parameter, GlFunctions::Enum value) {
@@ -187,7 +204,7 @@ GpuDirectLight::~GpuDirectLight() {
 }
 
 std::size_t GpuDirectLight::bytes() const {
-  return points_.size() + lamps_.size();
+  return points_.size() + runs_.size() + of_runs_.size();
 }
 
 void GpuDirectLight::check_texture(std::size_t number, const GpuLamp& lamp) const {
@@ -195,7 +212,7 @@ void GpuDirectLight::check_texture(std::size_t number, const GpuLamp& lamp) cons
   const TextureKind kind = texture_kind(lamp.shadow_map);
   int bound = 0;
   if (gl_->is_texture(lamp.texture) != 0) {
-    gl_->active_texture(Gl::kTexture0 + unit_of(lamp.shadow_map));
+    gl_->active_texture(Gl::kTexture0 + unit_of(lamp.shadow_map, 0));
     gl_->bind_texture(kind.target, 0);
     gl_->bind_texture(kind.target, lamp.texture);
     gl_->get_integer(kind.binding, &bound);
@@ -207,9 +224,9 @@ void GpuDirectLight::check_texture(std::size_t number, const GpuLamp& lamp) cons
   }
 }
 
-void GpuDirectLight::bind_texture(const GpuLamp& lamp) const {
+void GpuDirectLight::bind_texture(const GpuLamp& lamp, std::size_t slot) const {
   if (lamp.shadow_map == GpuShadowMap::kNoShadow) return;
-  const unsigned unit = unit_of(lamp.shadow_map);
+  const unsigned unit = unit_of(lamp.shadow_map, slot);
   gl_->active_texture(Gl::kTexture0 + unit);
   gl_->bind_texture(texture_kind(lamp.shadow_map).target, lamp.texture);
   gl_->bind_sampler(unit, samplers_[depth_falls(lamp) ? 1 : 0]);
@@ -221,29 +238,44 @@ void GpuDirectLight::run(std::span<const GpuLamp> lamps, unsigned others,
     check_lamp(k, lamps[k]);
     check_texture(k, lamps[k]);
   }
-  // One dark lamp writes what others give.
-  const std::size_t count = std::max<std::size_t>(lamps.size(), 1);
-  std::vector<unsigned char> blocks(count * kLampStride);
-  for (std::size_t k = 0; k < count; ++k) {
-    LampBlock block = lamps.empty() ? LampBlock{} : block_of(lamps[k]);
+  const std::size_t run_count = runs_for(lamps.size());
+  const auto lamps_of = [&](std::size_t k) {
+    const std::span<const GpuLamp> left = lamps.subspan(k * kLampsPerRun);
+    return left.first(std::min(left.size(), kLampsPerRun));
+  };
+  const auto is_last = [&](std::size_t k) {
+    return (k + 1) % kRunsAtOnce == 0 || k + 1 == run_count;
+  };
+  const auto of_run = static_cast<std::uint32_t>(kChannelCount * patch_count_);
+  std::vector<unsigned char> blocks(run_count * kRunStride);
+  for (std::size_t k = 0; k < run_count; ++k) {
+    RunBlock block;
+    std::ranges::transform(lamps_of(k), block.lamps.begin(), block_of);
+    const auto own_place = static_cast<std::uint32_t>(k % kRunsAtOnce);
     const Before first = others != 0 ? Before::kOthers : Before::kNothing;
+    const Before before = k < kRunsAtOnce ? first : Before::kThisBuffer;
     block.range = {static_cast<std::uint32_t>(patch_count_),
                    static_cast<std::uint32_t>(points_per_patch_),
-                   static_cast<std::uint32_t>(k == 0 ? first : Before::kThisBuffer), 0};
-    std::memcpy(blocks.data() + k * kLampStride, &block, sizeof(block));
+                   static_cast<std::uint32_t>(lamps_of(k).size()),
+                   static_cast<std::uint32_t>(is_last(k) ? before : Before::kNothing)};
+    block.runs = is_last(k) ? Words{0, own_place, of_run} : Words{own_place * of_run, 0, of_run};
+    std::memcpy(blocks.data() + k * kRunStride, &block, sizeof(block));
   }
-  lamps_.replace(blocks.size(), blocks.data());
-  unsigned index = 0;
-  for (const unsigned name : {points_.name(), direct_irradiance, others})
-    gl_->bind_buffer_base(Gl::kStorageBuffer, index++, name);
+  runs_.replace(blocks.size(), blocks.data());
+  gl_->bind_buffer_base(Gl::kStorageBuffer, 0, points_.name());
+  gl_->bind_buffer_base(Gl::kStorageBuffer, 2, others);
+  gl_->bind_buffer_base(Gl::kStorageBuffer, 3, of_runs_.name());
   const auto groups =
       static_cast<std::uint32_t>((patch_count_ + kPatchesPerGroup - 1) / kPatchesPerGroup);
-  for (std::size_t k = 0; k < count; ++k) {
-    if (k < lamps.size()) bind_texture(lamps[k]);
-    gl_->bind_buffer_range(Gl::kUniformBuffer, GlStateGuard::kStageBinding, lamps_.name(),
-                           static_cast<std::ptrdiff_t>(k * kLampStride), sizeof(LampBlock));
+  for (std::size_t k = 0; k < run_count; ++k) {
+    std::size_t slot = 0;
+    for (const GpuLamp& lamp : lamps_of(k)) bind_texture(lamp, slot++);
+    gl_->bind_buffer_base(Gl::kStorageBuffer, 1, is_last(k) ? direct_irradiance : of_runs_.name());
+    gl_->bind_buffer_range(Gl::kUniformBuffer, GlStateGuard::kStageBinding, runs_.name(),
+                           static_cast<std::ptrdiff_t>(k * kRunStride), sizeof(RunBlock));
+    if (is_last(k)) gl_->memory_barrier(Gl::kStorageBarrier);
     program_.run(groups);
-    gl_->memory_barrier(Gl::kStorageBarrier);
+    if (is_last(k)) gl_->memory_barrier(Gl::kStorageBarrier);
   }
 }
 

@@ -27,12 +27,13 @@ class GpuDirectLight {
 
  private:
   void check_texture(std::size_t number, const GpuLamp& lamp) const;
-  void bind_texture(const GpuLamp& lamp) const;
+  void bind_texture(const GpuLamp& lamp, std::size_t slot) const;
 
   std::shared_ptr<const GlFunctions> gl_;
   std::size_t patch_count_, points_per_patch_;
   ComputeProgram program_;
-  StorageBuffer points_, lamps_;
+  StorageBuffer points_, runs_;
+  StorageBuffer of_runs_;          ///< [run][patch][3], of runs that do not wait for each other
   unsigned samplers_[2] = {0, 0};  ///< for depth that grows with distance, and that falls
 };
 

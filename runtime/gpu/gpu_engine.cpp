@@ -21,7 +21,8 @@
 namespace rebounce {
 namespace {
 
-constexpr std::uint32_t kThreads = 64;  // of a work group of the shaders
+constexpr std::uint32_t kThreads = 64;      // of a work group of the shaders
+constexpr std::uint32_t kInputsAtOnce = 8;  // of a coefficient, in couple.glsl
 
 // Most that a context may ask for between parts of a uniform buffer.
 constexpr std::size_t kStageBytes = 256;
@@ -306,7 +307,7 @@ struct GpuEngine::Parts {
     for (const Stage stage : {Stage::kProjectPositions, Stage::kProjectClusters}) {
       run(stage, project, 1, {bases.name(), scales.name(), projections.name(), 0, 0, light.name()});
     }
-    run(Stage::kCouple, couple, kThreads,
+    run(Stage::kCouple, couple, kThreads / kInputsAtOnce,
         {couplings.name(), scales.name(), sides.name(), outputs.name(), inputs.name(), light.name(),
          arriving.name()});
     for (const Stage stage : {Stage::kExpandClusters, Stage::kExpandPositions}) {
@@ -398,7 +399,7 @@ void GpuEngine::set_sky(const Sky& sky) {
 void GpuEngine::light_patches(std::span<const GpuLamp> lamps, unsigned direct_irradiance,
                               unsigned others) {
   const GlStateGuard guard(*parts_->gl);
-  const GlTextureGuard textures(*parts_->gl);
+  const GlTextureGuard textures(*parts_->gl, std::max<std::size_t>(lamps.size(), 1));
   parts_->check_buffer("direct irradiance", direct_irradiance, parts_->patch_count);
   if (others != 0) parts_->check_buffer("light of others", others, parts_->patch_count);
   Parts::check_all_differ({direct_irradiance, others});

@@ -1,5 +1,6 @@
 #version 430
-// Products with coupling matrices: one thread for each coefficient of the arriving light.
+// Products with coupling matrices: one work group for 8 coefficients of the arriving light. Threads
+// are 8 inputs by 8 coefficients; their sums are added in a fixed order.
 layout(local_size_x = 64) in;
 
 layout(std140, binding = 8) uniform Stage {
@@ -16,6 +17,8 @@ layout(std430, binding = 4) readonly buffer Inputs { uint inputs[]; };     // sl
 layout(std430, binding = 5) readonly buffer Light { vec4 light[]; };
 layout(std430, binding = 6) writeonly buffer Arriving { vec4 arriving[]; };
 
+shared vec3 parts[64];
+
 // An entry in a format of GpuOperator: half, float or integer.
 float coupling(uint index, uint format) {
   if (format == 1u) return uintBitsToFloat(couplings[index]);
@@ -24,19 +27,27 @@ float coupling(uint index, uint format) {
   return unpackHalf2x16(pair)[index & 1u];
 }
 
-void main() {
-  uint index = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64u + gl_LocalInvocationID.x;
-  if (index >= range.x) return;
-  uvec2 place = outputs[index];
+// The product of a row of a side's matrix with every eighth input.
+vec3 product(uvec2 place, uint lane) {
   uvec4 side = sides[2u * place.x], strides = sides[2u * place.x + 1u];
   uvec3 value = side.z + channel_matrix.xyz * side.w + place.y * strides.x;
   vec3 sum = vec3(0.0);
-  for (uint k = 0u; k < side.y; ++k) {
-    vec3 factors = vec3(coupling(value.x, strides.w), coupling(value.y, strides.w),
-                     coupling(value.z, strides.w));
+  for (uint k = lane; k < side.y; k += 8u) {
+    uvec3 at = value + k * strides.y;
+    vec3 factors = vec3(coupling(at.x, strides.w), coupling(at.y, strides.w), coupling(at.z, strides.w));
     sum += factors * light[inputs[side.x + k]].xyz;
-    value += strides.y;
   }
+  return uintBitsToFloat(strides.z) * sum;
+}
+
+void main() {
+  uint thread = gl_LocalInvocationID.x, lane = thread % 8u;
+  uint index = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 8u + thread / 8u;
+  parts[thread] = index < range.x ? product(outputs[index], lane) : vec3(0.0);
+  barrier();
+  if (lane != 0u || index >= range.x) return;
+  vec3 sum = vec3(0.0);
+  for (uint k = 0u; k < 8u; ++k) sum += parts[thread + k];
   uint slot = range.z + index;
-  arriving[slot] = vec4(scales[slot] * uintBitsToFloat(strides.z) * sum, 0.0);
+  arriving[slot] = vec4(scales[slot] * sum, 0.0);
 }

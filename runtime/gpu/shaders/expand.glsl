@@ -2,7 +2,7 @@
 // Coefficients of all bases over a strip of 16 positions, and dense blocks, to the light that
 // arrives there: one work group for each strip. Threads are 16 positions by 4 groups of vectors;
 // their sums are added in a fixed order.
-layout(local_size_x = 64) in;
+layout(local_size_x = 128) in;
 
 layout(std140, binding = 8) uniform Stage {
   uvec4 range;           // items, first item, first output
@@ -21,7 +21,8 @@ layout(std430, binding = 4) readonly buffer Couplings { uint couplings[]; };  //
 layout(std430, binding = 5) readonly buffer Light { vec4 light[]; };
 layout(std430, binding = 6) buffer Arriving { vec4 arriving[]; };
 
-shared vec4 parts[64];
+const uint kLanes = 8u, kAtOnce = 2u;
+shared vec3 parts[16u * kLanes];
 
 vec4 narrow(uint word) {
   return vec4(bitfieldExtract(int(word), 0, 8), bitfieldExtract(int(word), 8, 8),
@@ -47,22 +48,33 @@ vec3 product(vec4 factors, uint slot) {
          factors.z * arriving[slot + 2u].xyz + factors.w * arriving[slot + 3u].xyz;
 }
 
-vec3 of_basis(uvec4 entry, uint position, uint lane) {
+// The product of groups of vectors at one position: those of a lane.
+vec3 of_groups(uint first_word, uint first_slot, uint count, bool is_wide, uint position, uint lane) {
   vec3 sum = vec3(0.0);
-  for (uint g = lane; g < entry.z; g += 4u) {
-    uint word = entry.x + 2u * (16u * g + position);
-    sum += product(wide(bases[word], bases[word + 1u]), entry.y + 4u * g);
-  }
-  uint first = entry.x + 32u * entry.z, slot = entry.y + 4u * entry.z;
-  for (uint g = lane; g < entry.w; g += 4u) {
-    sum += product(narrow(bases[first + 16u * g + position]), slot + 4u * g);
+  for (uint first = lane; first < count; first += kLanes * kAtOnce) {
+    uvec2 words[kAtOnce];
+    for (uint k = 0u; k < kAtOnce; ++k) {
+      uint group = min(first + k * kLanes, count - 1u);
+      uint word = first_word + (16u * group + position) * (is_wide ? 2u : 1u);
+      words[k] = uvec2(bases[word], is_wide ? bases[word + 1u] : 0u);
+      if (first + k * kLanes >= count) words[k] = uvec2(0u);
+    }
+    for (uint k = 0u; k < kAtOnce; ++k) {
+      uint group = min(first + k * kLanes, count - 1u);
+      sum += product(is_wide ? wide(words[k].x, words[k].y) : narrow(words[k].x), first_slot + 4u * group);
+    }
   }
   return sum;
 }
 
+vec3 of_basis(uvec4 entry, uint position, uint lane) {
+  return of_groups(entry.x, entry.y, entry.z, true, position, lane) +
+         of_groups(entry.x + 32u * entry.z, entry.y + 4u * entry.z, entry.w, false, position, lane);
+}
+
 vec3 of_dense_block(uvec4 block, uvec4 strides, uint position, uint lane) {
   vec3 sum = vec3(0.0);
-  for (uint k = lane; k < block.z; k += 4u) {
+  for (uint k = lane; k < block.z; k += kLanes) {
     uvec3 value = block.x + channel_matrix.xyz * block.w + position * strides.x + k * strides.y;
     sum += vec3(coupling(value.x, strides.w), coupling(value.y, strides.w),
                      coupling(value.z, strides.w)) * light[block.y + k].xyz;
@@ -80,9 +92,10 @@ void main() {
   for (uint e = strip.z; e < strip.w; e += 2u) {
     sum += of_dense_block(entries[e], entries[e + 1u], position, lane);
   }
-  parts[thread] = vec4(sum, 0.0);
+  parts[thread] = sum;
   barrier();
   if (lane != 0u) return;
+  for (uint k = 1u; k < kLanes; ++k) sum += parts[16u * k + position];
   uint slot = range.z + 16u * item + position;
-  arriving[slot] = scales[slot] * (((parts[position] + parts[position + 16u]) + parts[position + 32u]) + parts[position + 48u]);
+  arriving[slot] = vec4(scales[slot] * sum, 0.0);
 }

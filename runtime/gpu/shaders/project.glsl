@@ -1,6 +1,6 @@
 #version 430
 // Light to its coefficients in bases: one work group for up to 16 vectors of one basis. Threads are
-// 16 positions by 4 strips; their sums are added in a fixed order.
+// 16 positions by 4 groups of vectors; their sums are added in a fixed order.
 layout(local_size_x = 64) in;
 
 layout(std140, binding = 8) uniform Stage {
@@ -15,7 +15,11 @@ layout(std430, binding = 1) readonly buffer Scales { float scales[]; };
 layout(std430, binding = 2) readonly buffer Items { uvec4 items[]; };
 layout(std430, binding = 5) buffer Light { vec4 light[]; };
 
-shared vec4 parts[16][64];
+shared vec3 parts[16][16];     // [vector][position]
+shared vec3 quarters[16][4];
+
+// Strips whose words are read before the first is used.
+const uint kAtOnce = 8u;
 
 vec4 narrow(uint word) {
   return vec4(bitfieldExtract(int(word), 0, 8), bitfieldExtract(int(word), 8, 8),
@@ -31,31 +35,34 @@ void main() {
   uint item = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
   if (item >= range.x) return;
   item += range.y;
-  uvec4 input_range = items[2u * item], target = items[2u * item + 1u];
-  uint thread = gl_LocalInvocationID.x, position = thread % 16u;
-  uint groups = (target.y + 3u) / 4u;
-  vec3 sums[16];
-  for (int v = 0; v < 16; ++v) sums[v] = vec3(0.0);
-  for (uint strip = thread / 16u; strip < input_range.z; strip += 4u) {
-    vec3 value = light[input_range.y + 16u * strip + position].xyz;
-    uint word = input_range.x + strip * input_range.w;
-    for (int g = 0; g < 4; ++g) {
-      if (uint(g) >= groups) continue;
-      uint at = 16u * uint(g) + position;
-      vec4 factors = target.z != 0u ? wide(bases[word + 2u * at], bases[word + 2u * at + 1u])
-                                    : narrow(bases[word + at]);
-      for (int k = 0; k < 4; ++k) sums[4 * g + k] += factors[k] * value;
+  uvec4 from = items[2u * item], target = items[2u * item + 1u];
+  uint thread = gl_LocalInvocationID.x, position = thread % 16u, group = thread / 16u;
+  bool is_wide = target.z != 0u;
+  uint first_word = from.x + (16u * group + position) * (is_wide ? 2u : 1u);
+  uint strips = 4u * group < target.y ? from.z : 0u;
+  vec3 sums[4] = vec3[4](vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
+  for (uint first = 0u; first < strips; first += kAtOnce) {
+    vec3 values[kAtOnce];
+    uvec2 words[kAtOnce];
+    for (uint k = 0u; k < kAtOnce; ++k) {
+      uint strip = min(first + k, strips - 1u), word = first_word + strip * from.w;
+      values[k] = first + k < strips ? light[from.y + 16u * strip + position].xyz : vec3(0.0);
+      words[k] = uvec2(bases[word], is_wide ? bases[word + 1u] : 0u);
+    }
+    for (uint k = 0u; k < kAtOnce; ++k) {
+      vec4 factors = is_wide ? wide(words[k].x, words[k].y) : narrow(words[k].x);
+      for (int v = 0; v < 4; ++v) sums[v] += factors[v] * values[k];
     }
   }
-  for (int v = 0; v < 16; ++v) parts[v][thread] = vec4(sums[v], 0.0);
+  for (int v = 0; v < 4; ++v) parts[4u * group + uint(v)][position] = sums[v];
   barrier();
   uint vector = thread / 4u, quarter = thread % 4u;
-  vec4 sum = vec4(0.0);
-  for (uint k = 0u; k < 16u; ++k) sum += parts[vector][16u * quarter + k];
-  barrier();
-  parts[vector][quarter] = sum;
+  vec3 sum = vec3(0.0);
+  for (uint k = 0u; k < 4u; ++k) sum += parts[vector][4u * quarter + k];
+  quarters[vector][quarter] = sum;
   barrier();
   if (quarter != 0u || vector >= target.y) return;
+  sum = (quarters[vector][0] + quarters[vector][1]) + (quarters[vector][2] + quarters[vector][3]);
   uint slot = target.x + vector;
-  light[slot] = scales[slot] * (((parts[vector][0] + parts[vector][1]) + parts[vector][2]) + parts[vector][3]);
+  light[slot] = vec4(scales[slot] * sum, 0.0);
 }

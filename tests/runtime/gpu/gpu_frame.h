@@ -12,7 +12,7 @@
 
 #include "rebounce/engine.h"
 #include "rebounce/outputs.h"
-#include "tests/runtime/gpu/gl_context.h"
+#include "tests/gl/gl_context.h"
 #include "transfer/file/transfer_data.h"
 
 namespace rebounce::test {

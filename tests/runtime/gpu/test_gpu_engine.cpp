@@ -13,8 +13,8 @@
 #include "runtime/frame/c_handles.h"
 #include "runtime/gpu/gl_resources.h"
 #include "runtime/lights/light_sampling.h"
+#include "tests/gl/shadow_maps.h"
 #include "tests/runtime/gpu/gpu_frame.h"
-#include "tests/runtime/gpu/shadow_maps.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/hierarchical_samples.h"
 #include "tests/support/random_light.h"
@@ -302,7 +302,9 @@ TEST_F(GpuEngineTest, LightsPatchesByTheFormulasOfLamps) {
     expect(one, 0, wanted);
   }
   expect(lamps, others.name(), unshadowed(*data, lamps));
-  const std::vector<GpuLamp> many(40, lamps[0]);
+  std::vector<GpuLamp> many;
+  for (std::size_t k = 0; k < 41; ++k) many.push_back(lamps[k % lamps.size()]);
+  expect(many, others.name(), unshadowed(*data, many));
   expect(many, 0, unshadowed(*data, many));
   expect({}, others.name(), std::vector<Float3>(kPatches));
   gpu.light_patches({}, direct.name());
@@ -365,9 +367,10 @@ TEST_F(GpuEngineTest, LeavesTheTexturesOfTheContext) {
   GpuEngine gpu(data, eglGetProcAddress);
   unsigned sampler = 0;
   glGenSamplers(1, &sampler);
-  glActiveTexture(GL_TEXTURE10);
+  constexpr unsigned kOfPlane = GlTextureGuard::unit(0, 0), kOfCube = GlTextureGuard::unit(2, 1);
+  glActiveTexture(GL_TEXTURE0 + kOfPlane);
   glBindTexture(GL_TEXTURE_2D, other_plane.name());
-  glBindSampler(10, sampler);
+  glBindSampler(kOfPlane, sampler);
   glActiveTexture(GL_TEXTURE3);
   while (glGetError() != 0) {
   }
@@ -392,10 +395,10 @@ TEST_F(GpuEngineTest, LeavesTheTexturesOfTheContext) {
       return static_cast<unsigned>(found);
     };
     EXPECT_EQ(value(GL_ACTIVE_TEXTURE), static_cast<unsigned>(GL_TEXTURE3));
-    glActiveTexture(GL_TEXTURE10);
+    glActiveTexture(GL_TEXTURE0 + kOfPlane);
     EXPECT_EQ(value(GL_TEXTURE_BINDING_2D), other_plane.name());
     EXPECT_EQ(value(GL_SAMPLER_BINDING), sampler);
-    glActiveTexture(GL_TEXTURE12);
+    glActiveTexture(GL_TEXTURE0 + kOfCube);
     EXPECT_EQ(value(GL_TEXTURE_BINDING_CUBE_MAP), 0U);
     EXPECT_EQ(value(GL_SAMPLER_BINDING), 0U);
     glActiveTexture(GL_TEXTURE3);

@@ -10,8 +10,8 @@
 #include "rebounce/build_settings.h"
 #include "runtime/outputs/texel_light.h"
 #include "runtime/outputs/vertex_light.h"
+#include "tests/gl/shadow_maps.h"
 #include "tests/runtime/gpu/gpu_frame.h"
-#include "tests/runtime/gpu/shadow_maps.h"
 #include "tests/support/built_scene.h"
 #include "transfer/base/area_norm.h"
 #include "transfer/format/hierarchical_encoding.h"
@@ -204,6 +204,21 @@ void expect_direct_light(const TransferData& data, Engine& engine, GpuEngine& gp
   testing::Test::RecordProperty(what, std::to_string(difference));
 }
 
+/// Expects the light of all `lamps` to be the sum of what each gives.
+void expect_sum(GpuEngine& gpu, std::span<const GpuLamp> lamps, std::size_t patch_count) {
+  const test::LightBuffer found(patch_count);
+  std::vector<Float3> sum(patch_count);
+  for (const GpuLamp& lamp : lamps) {
+    gpu.light_patches({&lamp, 1}, found.name());
+    const std::vector<Float3> light = found.read();
+    for (std::size_t i = 0; i < patch_count; ++i) {
+      for (int c = 0; c < kChannelCount; ++c) sum[i][c] += light[i][c];
+    }
+  }
+  gpu.light_patches(lamps, found.name());
+  EXPECT_LE(test::largest_difference(sum, found.read()), 1e-5);
+}
+
 void expect_light_of_shadow_rays(const std::shared_ptr<const TransferData>& data) {
   Engine engine(data);
   GpuEngine gpu(data, eglGetProcAddress);
@@ -212,23 +227,30 @@ void expect_light_of_shadow_rays(const std::shared_ptr<const TransferData>& data
   constexpr double kTolerance = 0.02;
   Light point = lamp_in_the_middle(*data);
   point.range = 2 * maps.diagonal();
-  expect_direct_light(*data, engine, gpu, maps.cube(point, kSide), kTolerance, "point, cube");
-  expect_direct_light(*data, engine, gpu, maps.layers(point, kSide, true), kTolerance,
-                      "point, six layers");
+  std::vector<GpuLamp> lamps = {maps.cube(point, kSide), maps.layers(point, kSide, true)};
+  expect_direct_light(*data, engine, gpu, lamps[0], kTolerance, "point, cube");
+  expect_direct_light(*data, engine, gpu, lamps[1], kTolerance, "point, six layers");
   Light spot = point;
   spot.type = LightType::kSpot;
   spot.direction = {0.6F, -0.64F, 0.48F};
   spot.inner_cone_angle = 0.3F;
   spot.outer_cone_angle = 0.7F;
-  expect_direct_light(*data, engine, gpu, maps.plane(spot, kSide, false), kTolerance, "spot");
+  lamps.push_back(maps.plane(spot, kSide, false));
+  expect_direct_light(*data, engine, gpu, lamps.back(), kTolerance, "spot");
   Light sun;
   sun.type = LightType::kDirectional;
   sun.direction = {0.48F, -0.6F, 0.64F};
   engine.relight({&sun, 1}, {});
   const bool comes_in = area_norm(engine.direct_irradiance(), data->patches.area) > 0;
   if (comes_in) {
-    expect_direct_light(*data, engine, gpu, maps.plane(sun, 2 * kSide, true), kTolerance, "sun");
+    lamps.push_back(maps.plane(sun, 2 * kSide, true));
+    expect_direct_light(*data, engine, gpu, lamps.back(), kTolerance, "sun");
   }
+  spot.direction = {-0.6F, 0.64F, -0.48F};
+  lamps.push_back(maps.plane(spot, kSide, true));
+  point.position[1] += 0.1F * maps.diagonal();
+  lamps.push_back(maps.cube(point, kSide));
+  expect_sum(gpu, lamps, data->patches.size());  // more than one run
 }
 
 /// What rows add to `count` receivers, by plain sums over what is stored.
