@@ -33,7 +33,7 @@ struct Options {
   bool key_light = false;
   std::string own_lights;  ///< file
   double lamp_weight = SubdivisionSettings{}.lamp_weight;
-  ReceiverRowSettings rows;
+  ReceiverRowSettings rows{.at_vertices = false, .least_error = 0};
   std::size_t point_count = 20000;
   std::uint32_t samples = 512;
   int direct_points = DirectLightingSettings{}.points_per_patch;

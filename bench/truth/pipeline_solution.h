@@ -18,7 +18,7 @@ struct PipelineSettings {
   std::size_t patch_count = 1000;
   FormFactorQuality quality = FormFactorQuality::kDefault;
   int direct_points = 0;  ///< of a patch at which lamps are looked at
-  ReceiverRowSettings receiver_rows{};
+  ReceiverRowSettings receiver_rows{.at_vertices = false, .least_error = 0};
   /// The lamps that the build takes for the scene's own; by default those of the asset.
   std::optional<std::vector<Light>> own_lights{};
   double lamp_weight = SubdivisionSettings{}.lamp_weight;

@@ -136,7 +136,7 @@ class TransferBuild {
       make_operator_from_pairs(*tracer_, decided_, roles_, data_, report_, clock_);
     }
     data_.emitted_irradiance = irradiance_from_emitters(data_);
-    add_receiver_rows(model_.shown_patch, *tracer_, settings_, data_, clock_);
+    add_receiver_rows(model_.shown_patch, *tracer_, decided_, data_, report_, clock_);
   }
 
   /// All that follows on the scene.

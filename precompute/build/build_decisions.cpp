@@ -5,11 +5,16 @@
 #include "precompute/build/operator_stage.h"
 #include "precompute/exchange/links/links.h"
 #include "precompute/inverse/dense_transfer.h"
+#include "precompute/outputs/row_receivers.h"
 #include "rebounce/error.h"
 #include "runtime/frame/engine_parts.h"
 
 namespace rebounce {
 namespace {
+
+// Of the surface: where vertices that are small against patches show less than this, what all show
+// is never off by a tenth without rows of their own (lab/135).
+constexpr double kSmallPart = 0.25;
 
 /// The exchange that the operator is made from, if the settings leave it open.
 ExchangeSource choose_form_factors(const BuildSettings& settings, const PatchModel& model) {
@@ -27,6 +32,12 @@ ExchangeSource choose_form_factors(const BuildSettings& settings, const PatchMod
   return from_links && too_many ? ExchangeSource::kLinks : ExchangeSource::kPairs;
 }
 
+/// Whether rows of receivers are worth looking for where the settings leave it open.
+bool may_need_rows(const BuildSettings& settings, const PatchModel& model) {
+  if (settings.operator_kind == OperatorKind::kNoOperator) return false;
+  return SmallVertices(model.mesh, model.patches, model.shown_patch).part_of_surface() > kSmallPart;
+}
+
 }  // namespace
 
 /// The settings with everything decided that was left open.
@@ -39,6 +50,8 @@ BuildSettings decide(BuildSettings settings, const PatchModel& model) {
   if (restricted_roles && !hierarchical) {
     throw Error("receivers and sources are for hierarchical operators alone; ask for one");
   }
+  if (settings.receiver_rows.least_error > 0 && !may_need_rows(settings, model))
+    settings.receiver_rows.at_vertices = settings.receiver_rows.at_texels = false;
   if (settings.receiver_rows.any() && settings.operator_kind == OperatorKind::kNoOperator) {
     throw Error("rows of receivers need an operator; ask for one, or for receivers at patches");
   }

@@ -41,6 +41,7 @@ std::string settings_json(const BuildSettings& settings, double form_factor_tole
                       {"surface_harmonic_rays", settings.surface_harmonics.ray_count},
                       {"receiver_rows_at_vertices", settings.receiver_rows.at_vertices},
                       {"receiver_rows_at_texels", settings.receiver_rows.at_texels},
+                      {"receiver_row_least_error", settings.receiver_rows.least_error},
                       {"receiver_row_rays", settings.receiver_rows.ray_count},
                       {"receiver_row_tolerance", settings.receiver_rows.tolerance},
                       {"receiver_row_sets", settings.receiver_rows.most_sets},

@@ -48,7 +48,8 @@ void make_outputs(std::span<const std::uint32_t> shown_patch, const RayTracer& t
 }
 
 void add_receiver_rows(std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
-                       const BuildSettings& settings, TransferData& data, PhaseClock& clock) {
+                       const BuildSettings& settings, TransferData& data, BuildReport& report,
+                       PhaseClock& clock) {
   const auto make = [&](const char* phase, const RowReceivers& receivers) {
     return clock.run(phase, [&](const Progress& part) {
       return make_receiver_rows(data, shown_patch, receivers, tracer, settings.receiver_rows,
@@ -56,10 +57,12 @@ void add_receiver_rows(std::span<const std::uint32_t> shown_patch, const RayTrac
     });
   };
   if (settings.receiver_rows.at_vertices) {
-    data.receiver_rows = make("rows of vertices", VertexReceivers(data, shown_patch));
+    MadeReceiverRows made = make("rows of vertices", VertexReceivers(data, shown_patch));
+    data.receiver_rows = std::move(made.rows);
+    report.error_without_rows = made.error_without;
   }
   if (settings.receiver_rows.at_texels) {
-    data.texel_rows = make("rows of texels", TexelReceivers(data, shown_patch));
+    data.texel_rows = make("rows of texels", TexelReceivers(data, shown_patch)).rows;
   }
 }
 

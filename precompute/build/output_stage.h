@@ -22,9 +22,10 @@ void make_outputs(std::span<const std::uint32_t> shown_patch, const RayTracer& t
                   const BuildSettings& settings, TransferData& data, BuildReport& report,
                   PhaseClock& clock);
 
-/// Adds the rows of receivers that `settings` ask for to `data`, once it has its operator. Throws
-/// as make_receiver_rows does.
+/// Adds the rows of receivers that `settings` ask for to `data`, once it has its operator, and what
+/// vertices show without to `report`. Throws as make_receiver_rows does.
 void add_receiver_rows(std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
-                       const BuildSettings& settings, TransferData& data, PhaseClock& clock);
+                       const BuildSettings& settings, TransferData& data, BuildReport& report,
+                       PhaseClock& clock);
 
 }  // namespace rebounce

@@ -24,9 +24,11 @@
 namespace rebounce::cli {
 namespace {
 
+constexpr const char* kWhereNeeded = "where-needed";
+
 struct PrecomputeOptions {
   std::string scene, lights, output, form_factors, precision, reader;
-  std::string quality = "default", receivers_at = "patches";
+  std::string quality = "default", receivers_at = kWhereNeeded;
   std::string operator_kind = "hierarchical";
   std::vector<std::string> receivers, sources;  ///< each a list
   BuildSettings settings;
@@ -83,6 +85,7 @@ void print_json(const TransferData& data, const BuildReport& report, std::uint64
   summary["estimate"] = {{"peak_bytes", report.estimate.peak_bytes},
                          {"form_factor_seconds", report.estimate.form_factor_seconds},
                          {"inverse_seconds", report.estimate.inverse_seconds}};
+  if (report.error_without_rows) summary["error_without_rows"] = *report.error_without_rows;
   if (report.estimate_after_links) {
     summary["estimate_after_links"] = {{"peak_bytes", report.estimate_after_links->peak_bytes}};
   }
@@ -130,6 +133,11 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
         report.form_factor_error->mean, report.form_factor_error->max,
         report.form_factor_error->light_count, left_out(*report.form_factor_error));
   }
+  if (report.error_without_rows) {
+    fmt::print(
+        "vertices: off by {:.1e} by weights of patches alone, so they have {} of their own\n",
+        *report.error_without_rows, data.receiver_rows.empty() ? "no rows" : "rows");
+  }
   std::string times;
   for (const auto& [phase, s] : report.seconds) times += fmt::format("{} {:.1f} s, ", phase, s);
   fmt::print("{}file {:.1f} MiB\n", times, static_cast<double>(file_bytes) / (1 << 20));
@@ -168,6 +176,17 @@ std::vector<std::string> names_of(const auto& table) {
   return names;
 }
 
+/// --receivers-at. Files for pages have none where it is left open.
+void choose_receivers(const PrecomputeOptions& chosen, ReceiverRowSettings& rows) {
+  const bool for_web = chosen.reader == "web", is_open = chosen.receivers_at == kWhereNeeded;
+  if (for_web && !is_open && chosen.receivers_at != "patches") {
+    throw Error("pages show no rows of receivers; with --for web take --receivers-at patches");
+  }
+  rows.at_vertices = chosen.receivers_at == "vertices" || (is_open && !for_web);
+  rows.at_texels = chosen.receivers_at == "texels";
+  if (!is_open) rows.least_error = 0;
+}
+
 BuildSettings settings_of(const PrecomputeOptions& chosen) {
   BuildSettings settings = chosen.settings;
   parse_probes(chosen.probes, settings.probes);
@@ -179,11 +198,7 @@ BuildSettings settings_of(const PrecomputeOptions& chosen) {
   settings.form_factors = with_quality(quality_named(chosen.quality), settings.form_factors);
   if (!chosen.precision.empty()) settings.precision = precision_named(chosen.precision);
   settings.operator_kind = operator_kind(chosen.operator_kind);
-  if (chosen.reader == "web" && chosen.receivers_at != "patches") {
-    throw Error("pages show no rows of receivers; with --for web take --receivers-at patches");
-  }
-  settings.receiver_rows.at_vertices = chosen.receivers_at == "vertices";
-  settings.receiver_rows.at_texels = chosen.receivers_at == "texels";
+  choose_receivers(chosen, settings.receiver_rows);
   settings.memory_limit_bytes =
       static_cast<std::uint64_t>(chosen.memory_limit_gib * static_cast<double>(1ULL << 30));
   return settings;
@@ -359,9 +374,10 @@ void add_output_options(CLI::App& command, PrecomputeOptions& chosen) {
   command
       .add_option("--receivers-at", chosen.receivers_at,
                   "Where light arrives by rows of its own: at patches alone, from which vertices "
-                  "mix theirs; or, for scenes full of small things, at vertices or at the texels "
-                  "of the lightmap too")
-      ->check(CLI::IsMember({"patches", "vertices", "texels"}))
+                  "mix theirs; at vertices too, or at texels of the lightmap; or at vertices "
+                  "where-needed: if they are off by more than 10 % without, as in scenes full of "
+                  "small things")
+      ->check(CLI::IsMember({kWhereNeeded, "patches", "vertices", "texels"}))
       ->capture_default_str();
   ReceiverRowSettings& rows = chosen.settings.receiver_rows;
   command

@@ -26,6 +26,9 @@ constexpr std::size_t kLights = 32;
 // the scene's root mean square.
 constexpr float kDim = 0.1F;
 
+// Receivers whose light is looked at to decide whether rows are made.
+constexpr std::size_t kJudged = 1024;
+
 // Of light on single patches, beside lamps (lab/109).
 constexpr double kSinglePatchWeight = 0.1;
 
@@ -73,38 +76,39 @@ Lights light_scene(const TransferData& data, const RayTracer& tracer, std::uint6
 
 /// What the row of one receiver adds.
 struct AddedRow {
-  ViewRow added;          ///< by position of the tree, ascending
-  Eigen::VectorXf light;  ///< [lights] that it gets then, lx
-  double gain = 0;        ///< root mean square of what they add, relative to that
+  ViewRow added;                ///< by position of the tree, ascending
+  Eigen::VectorXf added_light;  ///< [lights] what it adds, lx
+  Eigen::VectorXf light;        ///< [lights] that the receiver gets then, lx
+  double gain = 0;              ///< root mean square of what they add, relative to that
 };
 
 class RowBuilder {
  public:
   RowBuilder(const TransferData& data, std::span<const std::uint32_t> shown_patch,
-             const RowReceivers& receivers, const RayTracer& tracer,
-             const ReceiverRowSettings& settings, std::uint64_t seed)
+             const RowReceivers& receivers, const RowReceivers::Candidates& candidates,
+             const RayTracer& tracer, const ReceiverRowSettings& settings, std::uint64_t seed)
       : data_(data),
         shown_patch_(shown_patch),
         receivers_(receivers),
         tracer_(tracer),
         settings_(settings),
         lights_(light_scene(data, tracer, seed)),
-        sources_(data.patches, lights_.radiosity) {}
-
-  ReceiverRows build(const Progress& progress) {
-    look_from_patches(part_of(progress, 0, kPatchShare));
-    const std::vector<std::uint32_t> order = receiver_order();
-    rows_.patch = sources_.tree.patch;
-    rows_.group_begin = {0};
-    set_of_cluster_.assign(sources_.tree.clusters.size(), kNone);
-    const Progress rest = part_of(progress, kPatchShare, 1);
-    constexpr std::size_t kBatch = kBatchGroups * kGroup;
-    for (std::size_t begin = 0; begin < order.size(); begin += kBatch) {
-      report_progress(rest, static_cast<double>(begin) / static_cast<double>(order.size()));
-      add_batch(std::span(order).subspan(begin, std::min(kBatch, order.size() - begin)));
+        sources_(data.patches, lights_.radiosity) {
+    for (const std::uint32_t k : build_cluster_tree(candidates.place, kGroup, kGroup).patch) {
+      receiver_.push_back(candidates.receiver[k]);
+      share_.push_back(candidates.share[k]);
     }
-    if (rows_.group_count() == 0) return {};
-    return std::move(rows_);
+  }
+
+  MadeReceiverRows build(const Progress& progress) {
+    MadeReceiverRows made;
+    if (settings_.least_error > 0) {
+      made.error_without = error_without_rows();
+      if (*made.error_without < settings_.least_error) return made;
+    }
+    make_rows(progress);
+    if (rows_.group_count() > 0) made.rows = std::move(rows_);
+    return made;
   }
 
  private:
@@ -117,34 +121,70 @@ class RowBuilder {
     std::vector<std::int8_t> value;
   };
 
-  void look_from_patches(const Progress& progress) {
+  void make_rows(const Progress& progress) {
+    std::vector<std::uint32_t> all(data_.patches.size());
+    std::iota(all.begin(), all.end(), 0U);
+    look_from_patches(all, part_of(progress, 0, kPatchShare));
+    rows_.patch = sources_.tree.patch;
+    rows_.group_begin = {0};
+    set_of_cluster_.assign(sources_.tree.clusters.size(), kNone);
+    const Progress rest = part_of(progress, kPatchShare, 1);
+    constexpr std::size_t kBatch = kBatchGroups * kGroup;
+    const std::size_t count = receiver_.size();
+    for (std::size_t begin = 0; begin < count; begin += kBatch) {
+      report_progress(rest, static_cast<double>(begin) / static_cast<double>(count));
+      add_batch(std::span(receiver_).subspan(begin, std::min(kBatch, count - begin)));
+    }
+  }
+
+  void look_from_patches(std::span<const std::uint32_t> patches, const Progress& progress) {
     const std::size_t n = data_.patches.size();
     const PatchTriangles triangles(data_.mesh.triangle_patch, n);
     patch_rows_.resize(n);
-    ParallelProgress parallel(progress, n);
+    ParallelProgress parallel(progress, patches.size());
 #pragma omp parallel
     {
       ReceiverViewer viewer(data_.mesh, shown_patch_, n, tracer_, settings_.ray_count);
 #pragma omp for schedule(dynamic, 16)
-      for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t k = 0; k < patches.size(); ++k) {
         if (parallel.stopped()) continue;
-        viewer.look_from_patch(triangles[i], patch_rows_[i]);
+        viewer.look_from_patch(triangles[patches[k]], patch_rows_[patches[k]]);
         parallel.advance();
       }
     }
     parallel.finish();
   }
 
-  /// The receivers that may get rows, neighbours after each other.
-  std::vector<std::uint32_t> receiver_order() const {
-    const RowReceivers::Candidates found = receivers_.candidates();
-    if (found.receiver.empty()) return {};
-    std::vector<std::uint32_t> order = build_cluster_tree(found.place, kGroup, kGroup).patch;
-    for (std::uint32_t& k : order) k = found.receiver[k];
-    return order;
+  /// That of MadeReceiverRows, from receivers spread over all.
+  double error_without_rows() {
+    const std::size_t step = std::max<std::size_t>(1, receiver_.size() / kJudged);
+    std::vector<std::uint32_t> judged, seen;
+    ViewRow weights;
+    for (std::size_t k = step / 2; k < receiver_.size(); k += step) {
+      judged.push_back(receiver_[k]);
+      receivers_.find_weights(receiver_[k], weights);
+      for (const ViewEntry& entry : weights) seen.push_back(entry.patch);
+    }
+    std::ranges::sort(seen);
+    seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
+    look_from_patches(seen, {});
+    const std::vector<AddedRow> found = compare_all(judged);
+    const double whole = std::accumulate(data_.patches.area.begin(), data_.patches.area.end(), 0.0);
+    Eigen::VectorXd square = Eigen::VectorXd::Zero(lights_.usual.size());
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      const Eigen::VectorXf& added = found[k].added_light;
+      if (added.size() == 0) continue;
+      const double share = static_cast<double>(step) * share_[step / 2 + k * step] / whole;
+      square += share * added.cwiseQuotient(lights_.usual).cwiseAbs2().cast<double>();
+    }
+    if (square.size() == 0) return 0;
+    const auto middle = square.begin() + square.size() / 2;
+    std::nth_element(square.begin(), middle, square.end());
+    return std::sqrt(*middle);
   }
 
-  void add_batch(std::span<const std::uint32_t> receivers) {
+  /// What rows of these receivers add.
+  std::vector<AddedRow> compare_all(std::span<const std::uint32_t> receivers) const {
     std::vector<AddedRow> found(receivers.size());
     const double sight = mean_patch_size();
 #pragma omp parallel
@@ -159,6 +199,11 @@ class RowBuilder {
         if (!row.empty()) found[k] = compare(receivers[k], row, sum);
       }
     }
+    return found;
+  }
+
+  void add_batch(std::span<const std::uint32_t> receivers) {
+    const std::vector<AddedRow> found = compare_all(receivers);
     std::vector<std::uint32_t> kept;
     for (std::uint32_t k = 0; k < found.size(); ++k) {
       if (found[k].gain > settings_.tolerance) kept.push_back(k);
@@ -204,6 +249,7 @@ class RowBuilder {
       added += part * sources_.light.row(p).transpose();
     }
     result.light = (result.light + added).cwiseMax(kDim * lights_.usual);
+    result.added_light = added;
     if (added.size() > 0) {
       result.gain = std::sqrt(added.cwiseQuotient(result.light).squaredNorm() /
                               static_cast<float>(added.size()));
@@ -341,18 +387,20 @@ class RowBuilder {
   const ReceiverRowSettings& settings_;
   const Lights lights_;
   const ReceiverSources sources_;
-  std::vector<ViewRow> patch_rows_;  ///< [n]
+  std::vector<std::uint32_t> receiver_;  ///< those that may get rows, neighbours after each other
+  std::vector<double> share_;            ///< m² of the surface that each shows
+  std::vector<ViewRow> patch_rows_;      ///< [n]
   std::vector<std::uint32_t> set_of_cluster_;
   ReceiverRows rows_;
 };
 
 }  // namespace
 
-ReceiverRows make_receiver_rows(const TransferData& data,
-                                std::span<const std::uint32_t> shown_patch,
-                                const RowReceivers& receivers, const RayTracer& tracer,
-                                const ReceiverRowSettings& settings, std::uint64_t seed,
-                                const Progress& progress) {
+MadeReceiverRows make_receiver_rows(const TransferData& data,
+                                    std::span<const std::uint32_t> shown_patch,
+                                    const RowReceivers& receivers, const RayTracer& tracer,
+                                    const ReceiverRowSettings& settings, std::uint64_t seed,
+                                    const Progress& progress) {
   if (settings.ray_count < kFewestReceiverRays) {
     throw Error("rows of receivers: a receiver needs at least 64 rays");
   }
@@ -360,8 +408,14 @@ ReceiverRows make_receiver_rows(const TransferData& data,
       settings.most_sets > ReceiverRows::kMostSets) {
     throw Error("rows of receivers: the tolerance must be at least 0, the sets from 4 to 1024");
   }
+  if (!(settings.least_error >= 0)) {
+    throw Error("rows of receivers: the error from which on there are some must be at least 0");
+  }
   if (!data.transfer) throw Error("rows of receivers need an operator; make one");
-  return RowBuilder(data, shown_patch, receivers, tracer, settings, seed).build(progress);
+  const RowReceivers::Candidates candidates = receivers.candidates();
+  if (candidates.receiver.empty()) return {};
+  return RowBuilder(data, shown_patch, receivers, candidates, tracer, settings, seed)
+      .build(progress);
 }
 
 }  // namespace rebounce

@@ -16,9 +16,10 @@ constexpr double kLargestShare = 0.5;
 // rises, half of what a point sees would lie behind the wall (lab/127).
 constexpr double kInwards = 1.0 / 256;
 
-void add(const Float3& position, const Float3& normal, std::uint32_t receiver,
+void add(const Float3& position, const Float3& normal, double share, std::uint32_t receiver,
          RowReceivers::Candidates& to) {
   to.receiver.push_back(receiver);
+  to.share.push_back(share);
   to.place.area.push_back(1);
   to.place.centroid.push_back(position);
   to.place.normal.push_back(normal);
@@ -37,41 +38,57 @@ void add_weights(const DisplayMesh& mesh, std::uint32_t vertex, float part, View
 
 }  // namespace
 
-VertexReceivers::VertexReceivers(const TransferData& data,
-                                 std::span<const std::uint32_t> shown_patch)
-    : data_(data),
+SmallVertices::SmallVertices(const DisplayMesh& mesh, const PatchTable& patches,
+                             std::span<const std::uint32_t> shown_patch)
+    : mesh_(mesh),
+      patches_(patches),
       shown_patch_(shown_patch),
-      triangles_(data.mesh.position.size(), [&](const auto& give) {
+      triangles_(mesh.position.size(), [&](const auto& give) {
         for (std::uint32_t t = 0; t < shown_patch.size(); ++t) {
           if (shown_patch[t] == kNone) continue;
-          for (const std::uint32_t v : data.mesh.triangle[t]) give(v, t);
+          for (const std::uint32_t v : mesh.triangle[t]) give(v, t);
         }
       }) {}
 
-bool VertexReceivers::is_finer_than_patches(std::uint32_t vertex) const {
+std::optional<double> SmallVertices::share(std::uint32_t vertex) const {
   double area = 0, of_patches = 0;
   for (const std::uint32_t t : triangles_[vertex]) {
-    const double size = area_of(corners_of(data_.mesh, t));
+    const double size = area_of(corners_of(mesh_, t));
     area += size;
-    of_patches += size * static_cast<double>(data_.patches.area[shown_patch_[t]]);
+    of_patches += size * static_cast<double>(patches_.area[shown_patch_[t]]);
   }
   const double share = area / 3;  // the integral of the hat function
-  return share * area < kLargestShare * of_patches;
+  if (share * area < kLargestShare * of_patches) return share;
+  return std::nullopt;
 }
+
+double SmallVertices::part_of_surface() const {
+  double small = 0, whole = 0;
+  for (std::uint32_t v = 0; v < mesh_.position.size(); ++v) small += share(v).value_or(0);
+  for (std::uint32_t t = 0; t < shown_patch_.size(); ++t) {
+    if (shown_patch_[t] != kNone) whole += area_of(corners_of(mesh_, t));
+  }
+  return whole > 0 ? small / whole : 0;
+}
+
+VertexReceivers::VertexReceivers(const TransferData& data,
+                                 std::span<const std::uint32_t> shown_patch)
+    : data_(data), small_(data.mesh, data.patches, shown_patch) {}
 
 RowReceivers::Candidates VertexReceivers::candidates() const {
   const DisplayMesh& mesh = data_.mesh;
   Candidates found;
   for (std::uint32_t v = 0; v < mesh.position.size(); ++v) {
-    if (!has_weights(mesh, v) || !is_finer_than_patches(v)) continue;
-    add(mesh.position[v], mesh.normal[v], v, found);
+    if (!has_weights(mesh, v)) continue;
+    const std::optional<double> share = small_.share(v);
+    if (share) add(mesh.position[v], mesh.normal[v], *share, v, found);
   }
   return found;
 }
 
 void VertexReceivers::look(std::uint32_t receiver, double sight, ReceiverViewer& viewer,
                            ViewRow& row) const {
-  viewer.look_from_vertex(receiver, triangles_[receiver], sight, row);
+  viewer.look_from_vertex(receiver, small_.triangles(receiver), sight, row);
 }
 
 void VertexReceivers::find_weights(std::uint32_t receiver, ViewRow& weights) const {
@@ -110,8 +127,14 @@ RowReceivers::Candidates TexelReceivers::candidates() const {
         data_.mesh.triangle[t], [&](std::uint32_t v) { return has_weights(data_.mesh, v); });
     if (!lit) continue;
     const Place place = place_of(k);
-    add(place.point.position, place.shading_normal, k, found);
+    add(place.point.position, place.shading_normal, 1, k, found);
   }
+  // Texels are about as large as each other.
+  double surface = 0;
+  for (std::uint32_t t = 0; t < shown_patch_.size(); ++t) {
+    if (shown_patch_[t] != kNone) surface += area_of(corners_of(data_.mesh, t));
+  }
+  std::ranges::fill(found.share, surface / static_cast<double>(found.share.size()));
   return found;
 }
 

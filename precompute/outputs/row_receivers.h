@@ -3,6 +3,7 @@
 // Receivers that may have rows of their own: vertices of the display mesh, texels of the lightmap.
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -17,7 +18,8 @@ class RowReceivers {
  public:
   struct Candidates {
     std::vector<std::uint32_t> receiver;
-    PatchTable place;  ///< position, normal and 1 as area of each, as if they were patches
+    PatchTable place;           ///< position, normal and 1 as area of each, as if they were patches
+    std::vector<double> share;  ///< m² of the surface that each shows
   };
 
   virtual ~RowReceivers() = default;
@@ -34,6 +36,29 @@ class RowReceivers {
   virtual void find_weights(std::uint32_t receiver, ViewRow& weights) const = 0;
 };
 
+/// The vertices that are small against patches, and what they show.
+class SmallVertices {
+ public:
+  /// `shown_patch` [t] is that of PatchModel. All must outlive the object.
+  SmallVertices(const DisplayMesh& mesh, const PatchTable& patches,
+                std::span<const std::uint32_t> shown_patch);
+
+  /// m² of the surface that a vertex shows, if that is small against the patches there.
+  std::optional<double> share(std::uint32_t vertex) const;
+  /// The part of the surface that all of them show.
+  double part_of_surface() const;
+  /// Those around a vertex that show a patch.
+  std::span<const std::uint32_t> triangles(std::uint32_t vertex) const {
+    return triangles_[vertex];
+  }
+
+ private:
+  const DisplayMesh& mesh_;
+  const PatchTable& patches_;
+  std::span<const std::uint32_t> shown_patch_;
+  Grouped<std::uint32_t> triangles_;
+};
+
 /// Vertices with reconstruction weights. On large walls, whose triangles are as large as patches,
 /// weights do as well as rows, and vertices get none.
 class VertexReceivers : public RowReceivers {
@@ -47,11 +72,8 @@ class VertexReceivers : public RowReceivers {
   void find_weights(std::uint32_t receiver, ViewRow& weights) const override;
 
  private:
-  bool is_finer_than_patches(std::uint32_t vertex) const;
-
   const TransferData& data_;
-  std::span<const std::uint32_t> shown_patch_;
-  Grouped<std::uint32_t> triangles_;  ///< of each vertex, those that show a patch
+  SmallVertices small_;
 };
 
 /// Texels of the lightmap. Those around a chart stand for the nearest place in their triangle.

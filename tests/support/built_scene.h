@@ -8,10 +8,14 @@
 namespace rebounce::test {
 
 /// A scene of tests/scenes through the offline stage.
-inline TransferData built_scene(const std::string& file, const BuildSettings& settings) {
-  BuildReport report;
+inline TransferData built_scene(const std::string& file, const BuildSettings& settings,
+                                BuildReport& report) {
   return build_transfer_data(std::filesystem::path(REBOUNCE_SOURCE_DIR) / "tests" / "scenes" / file,
                              settings, report);
+}
+inline TransferData built_scene(const std::string& file, const BuildSettings& settings) {
+  BuildReport report;
+  return built_scene(file, settings, report);
 }
 
 }  // namespace rebounce::test

@@ -77,6 +77,9 @@ struct BuildReport {
   std::optional<FormFactorError> form_factor_error;
   std::optional<WholeError> whole_error;  ///< of an operator from links
   double form_factor_tolerance = 0;       ///< that they were compressed to
+  /// Relative error of what vertices show by their weights alone, if rows of their own depend on it
+  /// (ReceiverRowSettings::least_error).
+  std::optional<double> error_without_rows;
   CostEstimate estimate;
   std::optional<CostEstimate> estimate_after_links;  ///< of what is left then
 };

@@ -97,8 +97,13 @@ struct SurfaceHarmonicSettings {
 /// What vertices of the display mesh or texels of the lightmap receive beyond what their patches do
 /// (ReceiverRows).
 struct ReceiverRowSettings {
-  bool at_vertices = false;  ///< whether vertices have rows of their own
-  bool at_texels = false;    ///< whether texels have; they need a lightmap
+  bool at_vertices = true;  ///< whether vertices have rows of their own
+  bool at_texels = false;   ///< whether texels have; they need a lightmap
+  /// Relative error of what is shown without rows from which on they are made; 0: always. It is
+  /// that of the light over the whole surface, median over lights, found from a sample of the
+  /// vertices. There are no rows either where vertices that are small against patches show less
+  /// than a quarter of the surface.
+  double least_error = 0.1;  // lab/135
   /// Rays of each receiver, at least 64. The noise of what receivers show falls with the number;
   /// offline time grows with it.
   int ray_count = 1024;

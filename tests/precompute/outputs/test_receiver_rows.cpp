@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "precompute/build/transfer_build.h"
+#include "precompute/compression/form_factor_compression.h"
+#include "precompute/lights/fitting_lights.h"
 #include "precompute/outputs/receiver_sets.h"
 #include "precompute/outputs/receiver_views.h"
 #include "rebounce/outputs.h"
@@ -12,6 +14,7 @@
 #include "runtime/rays/triangle.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/brute_force.h"
+#include "tests/support/built_scene.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/test_scenes.h"
 #include "tests/support/with_threads.h"
@@ -38,6 +41,7 @@ TransferData build(bool with_rows, double tolerance = 0.01) {
   settings.subdivision.patch_count = 60;
   settings.form_factors = with_quality(FormFactorQuality::kLow);
   settings.receiver_rows.at_vertices = with_rows;
+  settings.receiver_rows.least_error = 0;
   settings.receiver_rows.ray_count = 1024;
   settings.receiver_rows.tolerance = tolerance;
   BuildReport report;
@@ -143,6 +147,79 @@ TEST(ReceiverRows, AreOnlyStoredWhereTheyAddMoreThanTheTolerance) {
   EXPECT_EQ(build(true, 10).receiver_rows.group_count(), 0U);
 }
 
+/// m² of the surface that each vertex stands for.
+std::vector<double> vertex_areas(const DisplayMesh& mesh) {
+  std::vector<double> area(mesh.position.size());
+  for (std::uint32_t t = 0; t < mesh.surface_count(); ++t) {
+    if (mesh.triangle_patch[t] == kNone) continue;
+    for (const std::uint32_t v : mesh.triangle[t]) area[v] += area_of(corners_of(mesh, t)) / 3;
+  }
+  return area;
+}
+
+/// What rows add at the vertices under lights that operators are fitted to: root mean square over
+/// the surface, relative to the light of the patches; the median over 32 of them.
+double added_by(const TransferData& data) {
+  const std::vector<double> share = vertex_areas(data.mesh);
+  const RayTracer tracer = make_surface_tracer(data.mesh);
+  const std::vector<std::vector<Float3>> lights =
+      draw_fitting_lights(data, tracer, 1, data.transfer->roles()).training;
+  ReceiverProducts rows(data.receiver_rows, data.patches.area);
+  std::vector<float> workspace(data.transfer->workspace_size());
+  std::vector<double> parts;
+  for (std::size_t k = 0; k < 32; ++k) {
+    const std::vector<Float3>& light = lights[k * lights.size() / 32];
+    std::vector<Float3> arrives(light.size()), added(share.size());
+    data.transfer->apply(light, arrives, workspace);
+    const std::vector<std::vector<Float3>> radiosity =
+        radiosities_of(*data.transfer, data.patches.reflectance, {&light, 1});
+    rows.add(radiosity[0], added);
+    double off = 0, all = 0;
+    const auto mean = [](const Float3& v) { return (double{v[0]} + v[1] + v[2]) / 3; };
+    for (std::size_t v = 0; v < share.size(); ++v) off += share[v] * std::pow(mean(added[v]), 2);
+    for (std::size_t i = 0; i < light.size(); ++i)
+      all += data.patches.area[i] * std::pow(mean(arrives[i]), 2);
+    parts.push_back(std::sqrt(off / all));
+  }
+  std::ranges::sort(parts);
+  return parts[parts.size() / 2];
+}
+
+TEST(ReceiverRows, AreMadeWhereVerticesErrByMoreWithoutThem) {
+  TransferData data = build(false);
+  const RayTracer tracer = make_surface_tracer(data.mesh);
+  const auto make = [&](double least_error) {
+    const VertexReceivers vertices(data, data.mesh.triangle_patch);
+    const ReceiverRowSettings settings{
+        .least_error = least_error, .tolerance = 0, .most_sets = 1024};
+    return make_receiver_rows(data, data.mesh.triangle_patch, vertices, tracer, settings, 1);
+  };
+  MadeReceiverRows made = make(0.02);
+  ASSERT_GT(made.rows.group_count(), 0U);
+  ASSERT_TRUE(made.error_without.has_value());
+  data.receiver_rows = std::move(made.rows);
+  EXPECT_NEAR(*made.error_without / added_by(data), 1, 0.05);
+  const MadeReceiverRows none = make(1.01 * *made.error_without);
+  EXPECT_TRUE(none.rows.empty());
+  EXPECT_EQ(none.error_without, made.error_without);
+}
+
+TEST(ReceiverRows, AreMadeByDefaultInScenesFullOfSmallThings) {
+  BuildSettings settings;
+  settings.subdivision.patch_count = 500;
+  settings.form_factors = with_quality(FormFactorQuality::kLow);
+  BuildReport report;
+  const TransferData rooms = test::built_scene("three_rooms.gltf", settings, report);
+  EXPECT_GT(report.error_without_rows.value_or(0), settings.receiver_rows.least_error);
+  EXPECT_GT(rooms.receiver_rows.group_count(), 0U);
+
+  BuildReport of_box;  // whose vertices are hardly ever smaller than patches
+  EXPECT_TRUE(test::built_scene("white_room.gltf", settings, of_box).receiver_rows.empty());
+  EXPECT_FALSE(of_box.error_without_rows.has_value());
+  settings.operator_kind = OperatorKind::kNoOperator;
+  EXPECT_TRUE(test::built_scene("three_rooms.gltf", settings, of_box).receiver_rows.empty());
+}
+
 TEST(ReceiverRows, RefuseWhatCannotBe) {
   const TransferData data = build(false);
   const RayTracer tracer = make_surface_tracer(data.mesh);
@@ -153,6 +230,8 @@ TEST(ReceiverRows, RefuseWhatCannotBe) {
   test::expect_error([&] { make(data, {.ray_count = 63}); }, "at least 64 rays");
   test::expect_error([&] { make(data, {.tolerance = -1}); }, "tolerance");
   test::expect_error([&] { make(data, {.tolerance = NAN}); }, "tolerance");
+  test::expect_error([&] { make(data, {.least_error = -1}); }, "must be at least 0");
+  test::expect_error([&] { make(data, {.least_error = NAN}); }, "must be at least 0");
   test::expect_error([&] { make(data, {.most_sets = 3}); }, "from 4");
   test::expect_error([&] { make(data, {.most_sets = 1025}); }, "1024");
   TransferData without = data;
