@@ -32,9 +32,10 @@ ExchangeSource choose_form_factors(const BuildSettings& settings, const PatchMod
   return from_links && too_many ? ExchangeSource::kLinks : ExchangeSource::kPairs;
 }
 
-/// Whether rows of receivers are worth looking for where the settings leave it open.
+/// Whether rows of vertices are worth looking for where the settings leave it open.
 bool may_need_rows(const BuildSettings& settings, const PatchModel& model) {
-  if (settings.operator_kind == OperatorKind::kNoOperator) return false;
+  if (settings.operator_kind == OperatorKind::kNoOperator || settings.receiver_rows.at_texels)
+    return false;
   return SmallVertices(model.mesh, model.patches, model.shown_patch).part_of_surface() > kSmallPart;
 }
 
@@ -51,7 +52,7 @@ BuildSettings decide(BuildSettings settings, const PatchModel& model) {
     throw Error("receivers and sources are for hierarchical operators alone; ask for one");
   }
   if (settings.receiver_rows.least_error > 0 && !may_need_rows(settings, model))
-    settings.receiver_rows.at_vertices = settings.receiver_rows.at_texels = false;
+    settings.receiver_rows.at_vertices = false;
   if (settings.receiver_rows.any() && settings.operator_kind == OperatorKind::kNoOperator) {
     throw Error("rows of receivers need an operator; ask for one, or for receivers at patches");
   }

@@ -50,9 +50,10 @@ void make_outputs(std::span<const std::uint32_t> shown_patch, const RayTracer& t
 void add_receiver_rows(std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
                        const BuildSettings& settings, TransferData& data, BuildReport& report,
                        PhaseClock& clock) {
+  ReceiverRowSettings rows = settings.receiver_rows;
   const auto make = [&](const char* phase, const RowReceivers& receivers) {
     return clock.run(phase, [&](const Progress& part) {
-      return make_receiver_rows(data, shown_patch, receivers, tracer, settings.receiver_rows,
+      return make_receiver_rows(data, shown_patch, receivers, tracer, rows,
                                 settings.form_factors.seed, part);
     });
   };
@@ -62,6 +63,7 @@ void add_receiver_rows(std::span<const std::uint32_t> shown_patch, const RayTrac
     report.error_without_rows = made.error_without;
   }
   if (settings.receiver_rows.at_texels) {
+    rows.least_error = 0;  // they were asked for
     data.texel_rows = make("rows of texels", TexelReceivers(data, shown_patch)).rows;
   }
 }

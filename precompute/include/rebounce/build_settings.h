@@ -99,10 +99,10 @@ struct SurfaceHarmonicSettings {
 struct ReceiverRowSettings {
   bool at_vertices = true;  ///< whether vertices have rows of their own
   bool at_texels = false;   ///< whether texels have; they need a lightmap
-  /// Relative error of what is shown without rows from which on they are made; 0: always. It is
-  /// that of the light over the whole surface, median over lights, found from a sample of the
-  /// vertices. There are no rows either where vertices that are small against patches show less
-  /// than a quarter of the surface.
+  /// Of vertices: the relative error of what they show without rows from which on these are made;
+  /// 0: always. It is that of the light over the whole surface, median over lights, found from a
+  /// sample of vertices. There are no rows either where vertices that are small against patches
+  /// show less than a quarter of the surface, or where texels have rows.
   double least_error = 0.1;  // lab/135
   /// Rays of each receiver, at least 64. The noise of what receivers show falls with the number;
   /// offline time grows with it.
