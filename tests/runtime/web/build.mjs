@@ -27,7 +27,8 @@ const precompute = (name, file, ...options) => run(
 precompute('cornell_box', scene);
 precompute('cornell_box', join(page, 'scenes/cornell_box.safetensors'), '--for', 'web',
            '--compress-form-factors', '0.001', '--probes', '4,4,4', '--probe-rays', '96');
-precompute('furnished_room', join(folder, 'room.safetensors'));
+// Pages show no rows of vertices.
+precompute('furnished_room', join(folder, 'room.safetensors'), '--receivers-at', 'patches');
 precompute('furnished_room', join(page, 'scenes/furnished_room.safetensors'), '--for', 'web');
 precompute('pavilion', join(folder, 'pavilion.safetensors'));
 writeFileSync(join(folder, 'room_lights.json'), JSON.stringify({ lights: roomLights }));
