@@ -2,12 +2,9 @@
 
 #define GL_GLEXT_PROTOTYPES
 #include <GL/glcorearb.h>
-#include <omp.h>
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
-#include <numbers>
 #include <span>
 #include <string>
 #include <utility>
@@ -17,7 +14,6 @@
 #include "bench/support/light_changes.h"
 #include "bench/support/program.h"
 #include "bench/support/timing.h"
-#include "precompute/lights/random_lights.h"
 #include "rebounce/error.h"
 #include "rebounce/outputs.h"
 #include "runtime/frame/engine_parts.h"
@@ -46,40 +42,38 @@ std::string card_name() {
   return name == nullptr ? "unknown" : reinterpret_cast<const char*>(name);
 }
 
-/// Two time stamps of the card.
+/// Time on the card, by the engine's own time stamps.
 class CardTimer {
  public:
-  CardTimer() { glGenQueries(2, queries_.data()); }
-  ~CardTimer() { glDeleteQueries(2, queries_.data()); }
-  CardTimer(const CardTimer&) = delete;
-  CardTimer& operator=(const CardTimer&) = delete;
+  explicit CardTimer(const std::shared_ptr<const GlFunctions>& gl) : timer_(gl, 1) {
+    timer_.switch_on(true);
+  }
 
-  void begin() const { glQueryCounter(queries_[0], GL_TIMESTAMP); }
-  void end() const { glQueryCounter(queries_[1], GL_TIMESTAMP); }
+  void begin() { timer_.begin(); }
+  void end() { timer_.mark("all"); }
 
   /// Between the last two; waits for the card.
   double seconds() const {
-    std::array<GLuint64, 2> at{};
-    for (std::size_t k = 0; k < at.size(); ++k)
-      glGetQueryObjectui64v(queries_[k], GL_QUERY_RESULT, &at[k]);
-    return 1e-9 * static_cast<double>(at[1] - at[0]);
+    std::vector<GpuStageTime> times;
+    timer_.add_to(times);
+    return 1e-6 * times.front().microseconds;
   }
 
  private:
-  std::array<GLuint, 2> queries_{};
+  StageTimer timer_;
 };
 
 /// Copies a buffer that no cache holds: a frame after it finds its tables in the card's memory, and
 /// its time tells the bandwidth of that memory.
 class MemoryCopy {
  public:
-  MemoryCopy()
-      : gl_(std::make_shared<const GlFunctions>(eglGetProcAddress)),
-        program_(gl_, "copy", kCopyShader),
-        from_(gl_, kCopyBytes, nullptr),
-        to_(gl_, kCopyBytes, nullptr) {}
+  explicit MemoryCopy(const std::shared_ptr<const GlFunctions>& gl)
+      : program_(gl, "copy", kCopyShader),
+        from_(gl, kCopyBytes, nullptr),
+        to_(gl, kCopyBytes, nullptr),
+        timer_(gl) {}
 
-  void run() const {
+  void run() {
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, from_.name());
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 1, to_.name());
     timer_.begin();
@@ -103,7 +97,6 @@ void main() {
 }
 )glsl";
 
-  std::shared_ptr<const GlFunctions> gl_;
   ComputeProgram program_;
   StorageBuffer from_, to_;
   CardTimer timer_;
@@ -147,7 +140,12 @@ class GpuBenchmark {
         direct_(data->patches.size()),
         indirect_(data->patches.size()),
         radiosity_(data->patches.size()),
-        vertices_(data->mesh.position.size()) {
+        vertices_(data->mesh.position.size()),
+        gl_(std::make_shared<const GlFunctions>(eglGetProcAddress)),
+        copy_(gl_),
+        timer_(gl_),
+        tables_(make_gpu_operator(
+            dynamic_cast<const HierarchicalOperator&>(*data->transfer).storage())) {
     for (const GpuLamp& lamp : lamps_) lights_.push_back(lamp.light);
   }
 
@@ -159,7 +157,6 @@ class GpuBenchmark {
       for (int k = 0; k < options_.common.repeats; ++k) run_frame(true);
     }
     time_processor();
-    measure_tables();
     double of_product = 0;
     for (const StageSamples& stage : stages_) {
       const Timing timing = summarise(stage.seconds);
@@ -213,7 +210,7 @@ class GpuBenchmark {
   /// The same frame by the processor, and how far the light of the card is from it, of the same
   /// direct light.
   void time_processor() {
-    std::vector<Float3> at_vertices(vertices_of_scene());
+    std::vector<Float3> at_vertices(engine_.data().mesh.position.size());
     std::vector<Light> elsewhere = lights_;
     for (Light& light : elsewhere) light.position[1] += 1e-3F * maps_.diagonal();
     bool is_moved = false;
@@ -236,8 +233,6 @@ class GpuBenchmark {
     difference_ = relative_difference(indirect_.read(), engine_.indirect_irradiance(), area);
   }
 
-  std::size_t vertices_of_scene() const { return engine_.data().mesh.position.size(); }
-
   /// Microseconds that the processor takes for a stage of the card; nothing where it has no such
   /// stage.
   Table::Cell of_processor(const std::string& stage) const {
@@ -257,11 +252,6 @@ class GpuBenchmark {
     if (stage == "direct light") return direct_difference_;
     if (stage == kProduct) return difference_;
     return {};
-  }
-
-  void measure_tables() {
-    const auto& transfer = dynamic_cast<const HierarchicalOperator&>(*engine_.data().transfer);
-    tables_ = make_gpu_operator(transfer.storage());
   }
 
   /// What a stage reads of the operator, each table once; 0 if nothing.
@@ -298,14 +288,15 @@ class GpuBenchmark {
   std::vector<GpuLamp> lamps_;
   std::vector<Light> lights_;
   test::LightBuffer direct_, indirect_, radiosity_, vertices_;
+  std::shared_ptr<const GlFunctions> gl_;
   MemoryCopy copy_;
-  std::vector<StageSamples> stages_;
   CardTimer timer_;
+  GpuOperator tables_;
+  std::vector<StageSamples> stages_;
   std::vector<double> frames_, calls_;
   std::vector<double> copies_;  // bytes per second
   std::vector<Timing> processor_;
   double direct_difference_ = 0, difference_ = 0;
-  GpuOperator tables_;
 };
 
 void run(const GpuOptions& options) {

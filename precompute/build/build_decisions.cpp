@@ -12,8 +12,8 @@
 namespace rebounce {
 namespace {
 
-// Of the surface: where vertices that are small against patches show less than this, what all show
-// is never off by a tenth without rows of their own (lab/135).
+// Of the surface: where vertices that are small against patches show less than this, rows of their
+// own change little of what all show (lab/135).
 constexpr double kSmallPart = 0.25;
 
 /// The exchange that the operator is made from, if the settings leave it open.
@@ -51,12 +51,12 @@ BuildSettings decide(BuildSettings settings, const PatchModel& model) {
   if (restricted_roles && !hierarchical) {
     throw Error("receivers and sources are for hierarchical operators alone; ask for one");
   }
-  if (settings.receiver_rows.least_error > 0 && !may_need_rows(settings, model))
-    settings.receiver_rows.at_vertices = false;
-  if (settings.receiver_rows.any() && settings.operator_kind == OperatorKind::kNoOperator) {
+  ReceiverRowSettings& rows = settings.receiver_rows;
+  if (rows.at_vertices && rows.least_error > 0) rows.at_vertices = may_need_rows(settings, model);
+  if (rows.any() && settings.operator_kind == OperatorKind::kNoOperator) {
     throw Error("rows of receivers need an operator; ask for one, or for receivers at patches");
   }
-  if (settings.receiver_rows.at_texels && settings.lightmap.size == 0) {
+  if (rows.at_texels && settings.lightmap.size == 0) {
     throw Error("rows of texels need a lightmap; ask for one (--lightmap 512, for instance)");
   }
   if (!links && !Ranks().alone()) {

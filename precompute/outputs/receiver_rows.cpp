@@ -148,7 +148,8 @@ class RowBuilder {
 #pragma omp for schedule(dynamic, 16)
       for (std::size_t k = 0; k < patches.size(); ++k) {
         if (parallel.stopped()) continue;
-        viewer.look_from_patch(triangles[patches[k]], patch_rows_[patches[k]]);
+        ViewRow& row = patch_rows_[patches[k]];
+        if (row.empty()) viewer.look_from_patch(triangles[patches[k]], row);
         parallel.advance();
       }
     }
@@ -169,12 +170,11 @@ class RowBuilder {
     seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
     look_from_patches(seen, {});
     const std::vector<AddedRow> found = compare_all(judged);
-    const double whole = std::accumulate(data_.patches.area.begin(), data_.patches.area.end(), 0.0);
     Eigen::VectorXd square = Eigen::VectorXd::Zero(lights_.usual.size());
     for (std::size_t k = 0; k < found.size(); ++k) {
       const Eigen::VectorXf& added = found[k].added_light;
       if (added.size() == 0) continue;
-      const double share = static_cast<double>(step) * share_[step / 2 + k * step] / whole;
+      const double share = static_cast<double>(step) * share_[step / 2 + k * step] / whole_area();
       square += share * added.cwiseQuotient(lights_.usual).cwiseAbs2().cast<double>();
     }
     if (square.size() == 0) return 0;
@@ -375,9 +375,11 @@ class RowBuilder {
     rows_.receiver.resize(std::size_t{kGroup} * rows_.group_count(), kNone);
   }
 
+  double whole_area() const {
+    return sources_.area_before.back();
+  }
   double mean_patch_size() const {
-    const double whole = std::accumulate(data_.patches.area.begin(), data_.patches.area.end(), 0.0);
-    return std::sqrt(whole / static_cast<double>(data_.patches.size()));
+    return std::sqrt(whole_area() / static_cast<double>(data_.patches.size()));
   }
 
   const TransferData& data_;

@@ -399,7 +399,7 @@ void GpuEngine::set_sky(const Sky& sky) {
 void GpuEngine::light_patches(std::span<const GpuLamp> lamps, unsigned direct_irradiance,
                               unsigned others) {
   const GlStateGuard guard(*parts_->gl);
-  const GlTextureGuard textures(*parts_->gl, std::max<std::size_t>(lamps.size(), 1));
+  const GlTextureGuard textures(*parts_->gl, lamps.size());
   parts_->check_buffer("direct irradiance", direct_irradiance, parts_->patch_count);
   if (others != 0) parts_->check_buffer("light of others", others, parts_->patch_count);
   Parts::check_all_differ({direct_irradiance, others});

@@ -1,6 +1,6 @@
 #version 430
 // Coefficients of all bases over a strip of 16 positions, and dense blocks, to the light that
-// arrives there: one work group for each strip. Threads are 16 positions by 4 groups of vectors;
+// arrives there: one work group for each strip. Threads are 16 positions by 8 groups of vectors;
 // their sums are added in a fixed order.
 layout(local_size_x = 128) in;
 
