@@ -8,6 +8,7 @@
 #include "bench/support/machine.h"
 #include "bench/support/program.h"
 #include "bench/support/timing.h"
+#include "precompute/base/process_memory.h"
 
 namespace rebounce::bench {
 namespace {

@@ -8,6 +8,7 @@
 
 #include "bench/support/machine.h"
 #include "bench/support/timing.h"
+#include "precompute/base/process_memory.h"
 #include "precompute/compression/form_factor_compression.h"
 #include "precompute/compression/hierarchical_transfer.h"
 #include "precompute/compression/low_rank_transfer.h"

@@ -20,7 +20,4 @@ Machine describe_machine();
 /// disturb less than the time that passes.
 double processor_seconds();
 
-/// The most memory that this process has had so far; 0 where it cannot be known.
-std::size_t peak_memory_bytes();
-
 }  // namespace rebounce::bench

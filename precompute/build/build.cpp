@@ -6,6 +6,7 @@
 #include <set>
 #include <string_view>
 
+#include "precompute/base/process_memory.h"
 #include "precompute/build/build_decisions.h"
 #include "precompute/build/build_estimate.h"
 #include "precompute/build/exchange_stage.h"
@@ -110,9 +111,8 @@ class TransferBuild {
               : find_pairs(model_, tracer(), decided_, data_, report_, clock_);
     if (operator_of_links) {
       LinkedBuild build =
-          linked_build(built_scene(model_.patches.size(), model_.mesh), report_.link_count,
+          linked_build(built_scene(model_, decided_), report_.link_count,
                        model_.patches.reflectance, roles_, kCompressionPart * decided_.tolerance);
-      build.row_bytes = bytes_of_receiver_rows(model_, decided_);
       std::uint64_t& limit = decided_.memory_limit_bytes;
       announce(report_.estimate_after_links.emplace(estimate_after_links(build, limit)));
       limit -= std::min(limit - 1, build.held_bytes);  // what is left for the other stages
@@ -171,12 +171,17 @@ class TransferBuild {
     });
   }
 
-  /// Reports the estimate. Throws Error if the rest needs more memory than allowed.
-  void announce(const CostEstimate& estimate) {
+  /// Reports the estimate, which what the build has taken so far is a part of. Throws Error if the
+  /// rest needs more memory than allowed.
+  void announce(CostEstimate& estimate) {
+    const std::uint64_t peak = peak_memory_bytes();
+    if (peak > peak_before_) estimate.peak_bytes = std::max(estimate.peak_bytes, peak);
     if (on_estimate_) on_estimate_(estimate);
     refuse_if_too_large(estimate, decided_.memory_limit_bytes, report_.triangle_count);
   }
 
+  /// Of the process: a program that builds may have taken more before.
+  const std::uint64_t peak_before_ = peak_memory_bytes();
   const BuildSettings& settings_;
   BuildSettings decided_;  ///< settings_ with everything decided
   BuildReport& report_;

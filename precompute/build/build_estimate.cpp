@@ -27,7 +27,8 @@ constexpr std::size_t kEntryBytes = sizeof(std::uint32_t) + sizeof(float);
 // they are copied to.
 constexpr std::size_t kPairBytesMade = 3 * sizeof(ExchangeEntry) / 2 + kEntryBytes;
 
-// A pair beside a dense inverse: in the matrix, and expanded to rows.
+// A pair beside an operator of pairs: in the matrix, and expanded to rows where it is inverted in
+// single precision or where the inverse is checked.
 constexpr std::size_t kPairBytesKept = 2 * kEntryBytes;
 
 // A patch while form factors are computed: its points, and what its hemisphere rays meet.
@@ -42,11 +43,11 @@ constexpr std::size_t kVertexBytes = 400, kWeighedBytes = 3000, kWeighedOfPatch 
 
 // What libraries take when they are first used, Embree and OpenBLAS above all: the latter in
 // proportion to the products, up to the size of its buffers.
-constexpr std::size_t kLibraryBytes = 2'000'000, kLibraryBytesOfPatch = 12'000,
+constexpr std::size_t kLibraryBytes = 2'000'000, kLibraryBytesOfPatch = 20'000,
                       kMostLibraryBytes = 12'000'000;
 
-// What each thread but the first takes beside that.
-constexpr std::size_t kThreadBytesOfPatch = 5'000, kMostThreadBytes = 10'000'000;
+// What each thread but the first takes beside that while an operator is compressed.
+constexpr std::size_t kThreadBytesOfPatch = 24'000, kMostThreadBytes = 11'000'000;
 
 // Copies of the factors of a low-rank operator while they are found.
 constexpr std::size_t kFactorCopies = 6;
@@ -84,9 +85,12 @@ std::uint64_t bytes_beside_transfer(const LinkedBuild& build) {
 }
 
 std::uint64_t bytes_of_libraries(std::size_t patch_count) {
+  return std::min(kMostLibraryBytes, kLibraryBytes + kLibraryBytesOfPatch * patch_count);
+}
+
+std::uint64_t bytes_of_threads(std::size_t patch_count) {
   const auto others = static_cast<std::size_t>(omp_get_max_threads()) - 1;
-  return std::min(kMostLibraryBytes, kLibraryBytes + kLibraryBytesOfPatch * patch_count) +
-         others * std::min(kMostThreadBytes, kThreadBytesOfPatch * patch_count);
+  return others * std::min(kMostThreadBytes, kThreadBytesOfPatch * patch_count);
 }
 
 std::uint64_t bytes_of_weights(const BuiltScene& scene) {
@@ -96,26 +100,28 @@ std::uint64_t bytes_of_weights(const BuiltScene& scene) {
 
 }  // namespace
 
-std::uint64_t bytes_of_receiver_rows(const PatchModel& model, const BuildSettings& decided) {
-  const ReceiverRowSettings& rows = decided.receiver_rows;
-  if (!rows.any()) return 0;
-  const std::uint64_t n = model.patches.size(), rays = static_cast<std::uint64_t>(rows.ray_count);
-  const std::uint64_t texels = std::uint64_t{decided.lightmap.size} * decided.lightmap.size;
-  const std::uint64_t receivers =
-      (rows.at_vertices ? model.mesh.position.size() : 0) + (rows.at_texels ? texels : 0);
-  return sizeof(std::uint64_t) * n * std::min(n, rays) +
-         4 * std::uint64_t{rows.most_sets} * receivers;
-}
-
 std::uint64_t memory_limit_bytes(const BuildSettings& settings) {
   return settings.memory_limit_bytes > 0 ? settings.memory_limit_bytes : machine_memory_bytes() / 2;
 }
 
 BuiltScene built_scene(std::size_t patch_count, const DisplayMesh& mesh) {
-  BuiltScene scene{patch_count, mesh.position.size(), 0};
+  BuiltScene scene{.patch_count = patch_count, .vertex_count = mesh.position.size()};
   for (std::uint32_t t = 0; t < mesh.surface_count(); ++t) {
     scene.micro_triangle_count += mesh.opacity.of_triangle(t).size();
   }
+  return scene;
+}
+
+BuiltScene built_scene(const PatchModel& model, const BuildSettings& decided) {
+  BuiltScene scene = built_scene(model.patches.size(), model.mesh);
+  const ReceiverRowSettings& rows = decided.receiver_rows;
+  if (!rows.any()) return scene;
+  const std::uint64_t n = scene.patch_count, rays = static_cast<std::uint64_t>(rows.ray_count);
+  const std::uint64_t texels = std::uint64_t{decided.lightmap.size} * decided.lightmap.size;
+  const std::uint64_t receivers =
+      (rows.at_vertices ? scene.vertex_count : 0) + (rows.at_texels ? texels : 0);
+  scene.row_bytes =
+      sizeof(std::uint64_t) * n * std::min(n, rays) + 4 * std::uint64_t{rows.most_sets} * receivers;
   return scene;
 }
 
@@ -138,15 +144,17 @@ std::uint64_t peak_bytes_of_pairs(const BuiltScene& scene, std::size_t matrix_co
   if (kind == OperatorKind::kNoOperator) return before + most;
   const std::uint64_t inverses =
       dense_transfer_peak_bytes(scene.patch_count, matrix_count, arithmetic_of(kind));
-  std::uint64_t compression = 0;
+  const std::uint64_t inverse = n * n / 2 * matrix_count * sizeof(float);
+  std::uint64_t last = kPairBytesKept * pairs + inverse;
   if (kind == OperatorKind::kHierarchical) {
-    compression = dense_compression_peak_bytes(scene.patch_count, matrix_count);
+    last = kEntryBytes * pairs + bytes_of_threads(scene.patch_count) +
+           dense_compression_peak_bytes(scene.patch_count, matrix_count);
   } else if (kind == OperatorKind::kLowRank) {
     const std::uint64_t factors = kFactorCopies * n * std::min<std::uint64_t>(rank, n);
-    compression = (n * n / 2 + factors) * matrix_count * sizeof(float);
+    last = kEntryBytes * pairs + inverse + factors * matrix_count * sizeof(float);
   }
-  return before +
-         std::max({most, kPairBytesKept * pairs + inverses, kEntryBytes * pairs + compression});
+  return before + std::max({most, kEntryBytes * pairs + inverses, last,
+                            kEntryBytes * pairs + scene.row_bytes});
 }
 
 std::uint64_t peak_bytes_of_links(const LinkedBuild& build) {
@@ -162,7 +170,7 @@ std::uint64_t peak_bytes_after_links(const LinkedBuild& build, std::uint64_t lim
   const MatrixFreeTransferPlan plan =
       plan_matrix_free_transfer(build.scene.patch_count, build.matrix_count, settings);
   return bytes_beside_transfer(build) +
-         std::max<std::uint64_t>(plan.peak_bytes, bytes_of_weights(build.scene));
+         std::max({plan.peak_bytes, bytes_of_weights(build.scene), build.scene.row_bytes});
 }
 
 std::uint64_t memory_of_matrix_free_transfer(const LinkedBuild& build, std::uint64_t limit_bytes) {
@@ -172,13 +180,11 @@ std::uint64_t memory_of_matrix_free_transfer(const LinkedBuild& build, std::uint
 
 CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
                            const BuildSettings& decided, std::size_t link_count) {
-  const BuiltScene scene = built_scene(model.patches.size(), model.mesh);
+  const BuiltScene scene = built_scene(model, decided);
   const std::uint32_t matrices = distinct_channels(model.patches.reflectance);
   CostEstimate estimate = estimate_of(scene.patch_count, roles);
   if (decided.exchange_source == ExchangeSource::kPairs) {
-    estimate.peak_bytes =
-        peak_bytes_of_pairs(scene, matrices, decided.operator_kind, decided.rank) +
-        bytes_of_receiver_rows(model, decided);
+    estimate.peak_bytes = peak_bytes_of_pairs(scene, matrices, decided.operator_kind, decided.rank);
     return estimate;
   }
   const LinkedBuild build{scene,      resident_memory_bytes(),
@@ -187,8 +193,7 @@ CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
   estimate.peak_bytes = peak_bytes_of_links(build);
   if (decided.operator_kind != OperatorKind::kNoOperator) {
     estimate.peak_bytes =
-        std::max(estimate.peak_bytes, peak_bytes_after_links(build, decided.memory_limit_bytes) +
-                                          bytes_of_receiver_rows(model, decided));
+        std::max(estimate.peak_bytes, peak_bytes_after_links(build, decided.memory_limit_bytes));
   }
   return estimate;
 }
@@ -206,7 +211,7 @@ void sample_pairs(const PatchModel& model, const RayTracer& tracer, const BuildS
 CostEstimate estimate_after_links(const LinkedBuild& build, std::uint64_t limit_bytes) {
   CostEstimate estimate = estimate_of(build.scene.patch_count, build.roles);
   estimate.link_count = build.link_count;
-  estimate.peak_bytes = peak_bytes_after_links(build, limit_bytes) + build.row_bytes;
+  estimate.peak_bytes = peak_bytes_after_links(build, limit_bytes);
   return estimate;
 }
 

@@ -23,14 +23,16 @@ struct BuiltScene {
   std::size_t patch_count = 0;
   std::size_t vertex_count = 0;          ///< of the mesh that is shown
   std::size_t micro_triangle_count = 0;  ///< of triangles with opacity maps
+  /// Bytes of rows of receivers while they are found, in a stage of their own: those of the
+  /// patches, as sparse as rays leave them, and twice what is stored.
+  std::uint64_t row_bytes = 0;
 };
 
-/// Of rows of receivers while they are found: those of the patches, as sparse as rays leave them,
-/// and twice what is stored.
-std::uint64_t bytes_of_receiver_rows(const PatchModel& model, const BuildSettings& decided);
-
-/// Those of patches and their mesh.
+/// Those of patches and their mesh, without rows of receivers.
 BuiltScene built_scene(std::size_t patch_count, const DisplayMesh& mesh);
+
+/// Those of a model, with the rows of receivers that `decided` asks for.
+BuiltScene built_scene(const PatchModel& model, const BuildSettings& decided);
 
 /// Peak memory of the process while it makes form factors and operator from pairs, if half of all
 /// patches face each other: on top of what it holds when this is called.
@@ -46,7 +48,6 @@ struct LinkedBuild {
   std::uint32_t matrix_count = 1;  ///< distinct reflectance channels
   PatchRoles roles{};
   double tolerance = kDefaultTolerance;  ///< of the operator
-  std::uint64_t row_bytes = 0;           ///< of rows of vertices, which are found last
 };
 
 /// Of a model whose links are known and in memory.

@@ -1,7 +1,6 @@
 #include "precompute/cli/console.h"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <cmath>
@@ -88,12 +87,6 @@ void ProgressBar::clear() {
   if (drawn_) fmt::print(to_, "\r\033[K");
   std::fflush(to_);
   drawn_ = false;
-}
-
-std::uint64_t peak_memory_bytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
 }
 
 void print_note(const CommonOptions& options, const std::string& line) {

@@ -50,9 +50,6 @@ class ProgressBar {
   Clock::time_point phase_begin_{}, last_shown_;
 };
 
-/// The most memory that the program has held so far.
-std::uint64_t peak_memory_bytes();
-
 /// Prints `line` on standard error unless `quiet`.
 void print_note(const CommonOptions& options, const std::string& line);
 

@@ -5,6 +5,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "precompute/base/process_memory.h"
 #include "precompute/build/build_advice.h"
 #include "precompute/build/kept_tolerances.h"
 #include "precompute/build/transfer_build.h"

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "precompute/base/process_memory.h"
 #include "precompute/cli/commands.h"
 #include "precompute/cli/output_check.h"
 #include "precompute/facets/read_facets.h"

@@ -27,6 +27,11 @@ constexpr double kLeastEmphasis = 0.5, kMostEmphasis = 4;
 // reflect no light, exact enough as lamps (lab/043).
 constexpr double kUniformShare = 0.1;
 
+// A light that joins makes rounding finer at positions where it has more than this multiple of the
+// usual energy of all training lights at a position, by 2^kFinest at most (lab/136).
+constexpr double kConcentrated = 16;
+constexpr int kFinest = 8;
+
 using Exitances = std::span<const std::vector<Float3>>;
 
 /// `lights`, after one under which every patch, black ones too, gives off the same.
@@ -76,6 +81,14 @@ std::vector<std::int8_t> CompressionFrame::balance() {
   return exponent;
 }
 
+void CompressionFrame::shift(std::span<const std::int8_t> by) {
+  for (std::size_t k = 0; k < by.size(); ++k) {
+    const double factor = std::exp2(-by[k]);
+    sample.row(static_cast<Eigen::Index>(k)) *= factor;
+    background[static_cast<Eigen::Index>(k)] *= factor;
+  }
+}
+
 CompressionFrame compression_frame(const SymmetricMatrix& matrix, const PatchTable& patches,
                                    Exitances training) {
   return frame_of(matrix, patches,
@@ -92,6 +105,7 @@ MatrixCompression::MatrixCompression(const SymmetricMatrix& matrix, const PatchT
       frame_(frame_of(matrix, patches, truth_)) {
   if (!options.equilibrated) return;
   exponent_ = frame_.balance();
+  finer_.assign(exponent_.size(), 0);
   equilibrated_.emplace(matrix, by_patch(exponent_, frame_.tree));
 }
 
@@ -144,6 +158,27 @@ void MatrixCompression::add_training_light(const ReferenceLighting& lights, std:
     frame_.sample(static_cast<Eigen::Index>(i), last) *=
         std::exp2(static_cast<float>(exponent_[i]));
   }
+  round_finer_where_lit();
+}
+
+void MatrixCompression::round_finer_where_lit() {
+  const Eigen::MatrixXd& sample = frame_.sample;
+  const Eigen::VectorXd inverse = frame_.background.cwiseAbs2().cwiseInverse();
+  const double usual =
+      sample.rowwise().squaredNorm().dot(inverse) / static_cast<double>(sample.rows());
+  std::vector<std::int8_t> more(exponent_.size(), 0);
+  for (std::size_t i = 0; i < more.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    const double value = sample(row, sample.cols() - 1);
+    const double energy = value * value * inverse[row] / usual;
+    if (!(energy > kConcentrated)) continue;
+    const int wanted = std::min<int>(std::lround(std::log2(1 + energy) / 2), kFinest);
+    more[i] = static_cast<std::int8_t>(std::max(0, wanted - finer_[i]));
+    finer_[i] = static_cast<std::int8_t>(finer_[i] + more[i]);
+    exponent_[i] = static_cast<std::int8_t>(exponent_[i] - more[i]);
+  }
+  frame_.shift(more);
+  equilibrated_.emplace(matrix_, by_patch(exponent_, frame_.tree));
 }
 
 HierarchicalStorage compress_matrix(const SymmetricMatrix& matrix, const PatchTable& patches,

@@ -34,6 +34,9 @@ struct CompressionFrame {
   /// lights is about 1: x becomes R x. Returns the exponents of R, powers of two, by position.
   std::vector<std::int8_t> balance();
 
+  /// Changes the coordinates again: x becomes 2^-`by` x, by position.
+  void shift(std::span<const std::int8_t> by);
+
   std::vector<ClusterWeight> weights() const {
     return make_cluster_weights(tree.clusters, sample, background, roles);
   }
@@ -73,16 +76,21 @@ class MatrixCompression {
   /// Gives the training lights weight by the errors that they have with `transfer`.
   void emphasise(const TransferOperator& transfer);
 
-  /// Adds light k of `lights`, of the same matrix, to the training lights.
+  /// Adds light k of `lights`, of the same matrix, to the training lights. Where it shines far more
+  /// than training lights do, positions are rounded more finely from then on.
   void add_training_light(const ReferenceLighting& lights, std::size_t k);
 
  private:
+  /// Makes K larger at positions where the last training light has much of its energy.
+  void round_finer_where_lit();
+
   const SymmetricMatrix& matrix_;
   PartSizes sizes_;
   bool nested_;
   ReferenceLighting truth_;
   CompressionFrame frame_;
   std::vector<std::int8_t> exponent_;  ///< by position, as EquilibratedMatrix has them
+  std::vector<std::int8_t> finer_;     ///< by how much they are below those of the background
   std::optional<EquilibratedMatrix> equilibrated_;
 };
 

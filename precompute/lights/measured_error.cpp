@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <iterator>
 #include <numeric>
 
 #include "precompute/base/ranks.h"
@@ -11,6 +12,7 @@
 #include "precompute/lights/reference_solution.h"
 #include "precompute/lights/solve_batches.h"
 #include "rebounce/error.h"
+#include "runtime/rays/sampling.h"
 #include "transfer/base/area_norm.h"
 #include "transfer/base/parallel.h"
 
@@ -23,6 +25,15 @@ using Exitances = std::vector<std::vector<Float3>>;
 // errors alone.
 constexpr int kLightCount = 256, kRoundedLightCount = 16;
 
+// Against an exact operator point lights are cheap. The lamps that err most light one or two
+// patches (lab/103): large scenes have more of them, up to this many groups of kLightCount lights
+// (lab/136).
+constexpr std::size_t kPatchesOfGroup = 1024, kMostGroups = 4;
+
+std::size_t point_light_groups(std::size_t patch_count) {
+  return std::clamp<std::size_t>(patch_count / kPatchesOfGroup, 1, kMostGroups);
+}
+
 // Lights whose truth is asked for at a time.
 constexpr std::size_t kLightsTogether = 64;
 
@@ -30,6 +41,11 @@ constexpr std::size_t kLightsTogether = 64;
 // and relative to the reflected light, in parts of the tolerance, where it changes an error by a
 // thousandth at most (lab/049).
 constexpr double kReferenceResidual = 1e-10, kResidualOfTolerance = 0.02;
+
+/// The seed of a group of lights; the first keeps that of the check.
+std::uint64_t group_seed(std::uint64_t seed, std::size_t group) {
+  return group == 0 ? seed : mix_bits(seed + group);
+}
 
 KindError summary(LightKind kind, std::size_t light_count, const std::vector<double>& errors) {
   const double sum = std::accumulate(errors.begin(), errors.end(), 0.0);
@@ -44,27 +60,42 @@ KindError summary(LightKind kind, std::size_t light_count, const std::vector<dou
 /// Returns the errors of lights of a kind, without those from which nothing arrives.
 using ErrorsOf = std::function<std::vector<double>(LightKind, const Exitances&, const Progress&)>;
 
-std::vector<KindError> measure(const TransferData& data, const RayTracer& tracer, int light_count,
-                               std::uint64_t seed, const ErrorsOf& errors_of,
-                               const Progress& progress) {
+/// How many lights are measured: so many of a kind at a time, and point lights in several groups.
+struct LightCounts {
+  int of_group = kLightCount;
+  std::size_t point_groups = 1;
+
+  std::size_t groups(LightKind kind) const { return kind == LightKind::kPoint ? point_groups : 1; }
+  std::size_t all_groups() const { return kLightKinds.size() - 1 + point_groups; }
+};
+
+std::vector<KindError> measure(const TransferData& data, const RayTracer& tracer,
+                               const LightCounts& counts, std::uint64_t seed,
+                               const ErrorsOf& errors_of, const Progress& progress) {
   std::vector<KindError> result;
-  for (std::size_t k = 0; k < kLightKinds.size(); ++k) {
-    const Progress part = [&](double done) {
-      return !progress || progress((k + done) / kLightKinds.size());
-    };
-    if (!part(0)) throw Cancelled();
-    const LightKind kind = kLightKinds[k];
-    const Exitances lights =
-        random_initial_exitances(data, tracer, kind, light_count, seed, data.transfer->roles());
-    const std::vector<double> errors = errors_of(kind, lights, part);
-    if (!errors.empty()) result.push_back(summary(kind, lights.size(), errors));
+  std::size_t groups_done = 0;
+  const auto total = static_cast<double>(counts.all_groups());
+  const Progress part = [&](double done) {
+    return !progress || progress((static_cast<double>(groups_done) + done) / total);
+  };
+  for (const LightKind kind : kLightKinds) {
+    std::vector<double> errors;
+    std::size_t light_count = 0;
+    for (std::size_t group = 0; group < counts.groups(kind); ++group, ++groups_done) {
+      if (!part(0)) throw Cancelled();
+      const Exitances lights = random_initial_exitances(
+          data, tracer, kind, counts.of_group, group_seed(seed, group), data.transfer->roles());
+      light_count += lights.size();
+      std::ranges::copy(errors_of(kind, lights, part), std::back_inserter(errors));
+    }
+    if (!errors.empty()) result.push_back(summary(kind, light_count, errors));
   }
   return result;
 }
 
 /// The errors of `light_count` lights of each kind.
 std::vector<KindError> measure_against(const TransferData& data, const RayTracer& tracer,
-                                       const IrradiancesOf& truth_of, int light_count,
+                                       const IrradiancesOf& truth_of, const LightCounts& counts,
                                        std::uint64_t seed, const Progress& progress,
                                        const LightListener& on_point_light) {
   const auto errors_of = [&](LightKind kind, const Exitances& lights, const Progress& part) {
@@ -75,7 +106,7 @@ std::vector<KindError> measure_against(const TransferData& data, const RayTracer
     }
     return errors;
   };
-  return measure(data, tracer, light_count, seed, errors_of, progress);
+  return measure(data, tracer, counts, seed, errors_of, progress);
 }
 
 }  // namespace
@@ -127,13 +158,15 @@ std::vector<KindError> measure_error(const TransferData& data, const RayTracer& 
         return reference.indirect_irradiances(some, kReferenceResidual);
       });
     };
-    return measure_against(data, tracer, truth_of, kRoundedLightCount, seed, progress, {});
+    return measure_against(data, tracer, truth_of, {.of_group = kRoundedLightCount}, seed, progress,
+                           {});
   }
   const auto errors_of = [&](LightKind, const Exitances& lights, const Progress&) {
     return ReferenceLighting(DenseMatrix(*exact, data.transfer->roles()), lights)
         .errors(*data.transfer);
   };
-  return measure(data, tracer, kLightCount, seed, errors_of, progress);
+  const LightCounts counts{.point_groups = point_light_groups(data.patches.size())};
+  return measure(data, tracer, counts, seed, errors_of, progress);
 }
 
 double reference_residual(double tolerance) {
@@ -144,7 +177,7 @@ std::vector<KindError> measure_error(const TransferData& data, const RayTracer& 
                                      const IrradiancesOf& truth_of, std::uint64_t seed,
                                      const Progress& progress,
                                      const LightListener& on_point_light) {
-  return measure_against(data, tracer, truth_of, kLightCount, seed, progress, on_point_light);
+  return measure_against(data, tracer, truth_of, {}, seed, progress, on_point_light);
 }
 
 }  // namespace rebounce

@@ -51,7 +51,8 @@ std::vector<LightError> light_errors(const TransferData& data,
 /// sources, at its receivers.
 ///
 /// With `exact`, the operator in f32 that data.transfer was compressed from, that operator is the
-/// reference, and there are 256 lights of a kind. Without it, data.transfer has rounding errors
+/// reference, and there are 256 lights of a kind; of point lights one for every four patches, up to
+/// 1,024. Without it, data.transfer has rounding errors
 /// alone: the reference is ReferenceSolver on the pairs or the links of `data` to 1e-10, with 16
 /// lights of a kind. `data` must then hold pairs or links: compressed form factors are no
 /// reference, because their error is part of what is measured.

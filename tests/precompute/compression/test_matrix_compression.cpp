@@ -1,0 +1,104 @@
+// The compression of one matrix, and what a light that joins later changes in it.
+
+#include "precompute/compression/matrix_compression.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <random>
+
+#include "tests/support/solved_room.h"
+#include "tests/support/unshadowed_lights.h"
+#include "transfer/format/hierarchical_encoding.h"
+#include "transfer/operator/hierarchical_operator.h"
+
+namespace rebounce::test_matrix_compression {
+namespace {
+
+constexpr double kMultiplier = 1e-7;
+
+const test::SolvedRoom& room() {
+  static const test::SolvedRoom made(
+      test::furnished_room({0.7F, 0.5F, 0.2F}, {0.3F, 0.3F, 0.3F}, {0.1F, 0.3F, 0.9F}), 1200);
+  return made;
+}
+
+/// A 64th of what a patch has, for one patch in five: those at the bottom of slots.
+std::vector<std::int8_t> slots() {
+  std::mt19937_64 engine(1);
+  std::vector<std::int8_t> result(room().patches.size(), 0);
+  for (std::int8_t& exponent : result)
+    exponent = engine() % 5 == 0 ? std::int8_t{6} : std::int8_t{0};
+  return result;
+}
+
+std::vector<Float3> light_on(std::size_t patch) {
+  std::vector<Float3> light(room().patches.size(), Float3{0, 0, 0});
+  light[patch] = {1, 1, 1};
+  return light;
+}
+
+struct Compressed {
+  HierarchicalStorage exact;
+  double rounding;  ///< what 8 bits change in the light, relative to it
+};
+
+Compressed compress(const MatrixCompression& compression, const std::vector<Float3>& light) {
+  Compressed result{compression.at(kMultiplier, {BlockCheckpoint(), {}}), 0};
+  const auto lit = [&](Precision precision) {
+    return product(HierarchicalOperator(encode_values(result.exact, precision)), light);
+  };
+  result.rounding =
+      relative_difference(lit(Precision::kQ8), lit(Precision::kF32), room().patches.area);
+  return result;
+}
+
+TEST(MatrixCompression, PositionsThatAJoinedLightShinesOnAloneAreRoundedMoreFinely) {
+  const DenseMatrix matrix(*room().dense);
+  const std::vector<std::int8_t> exponent = slots();
+  const EquilibratedMatrix dark(matrix, exponent);
+  const auto training = test::unshadowed_lights(room().patches, 24, 1, 2.2, 0.7);
+  const CompressionOptions options{.equilibrated = true, .nested = true};
+  double before = 0, after = 0;
+  for (std::size_t patch = 0; patch < exponent.size(); patch += 400) {
+    const std::vector<Float3> light = light_on(patch);
+    MatrixCompression compression(dark, room().patches, training, {}, options);
+    const Compressed first = compress(compression, light);
+    const ReferenceLighting joined(dark, std::span(&light, 1));
+    compression.add_training_light(joined, 0);
+    const Compressed second = compress(compression, light);
+    const std::vector<std::int8_t>&old = first.exact.scale_exponent,
+          &changed = second.exact.scale_exponent;
+    ASSERT_EQ(old.size(), changed.size());
+    for (std::size_t k = 0; k < old.size(); ++k) {
+      if (second.exact.patch[k] == patch) {
+        EXPECT_LT(changed[k], old[k]);
+      } else {
+        EXPECT_EQ(changed[k], old[k]);
+      }
+    }
+    before += first.rounding;
+    after += second.rounding;
+    // The same light again leaves all as it is.
+    compression.add_training_light(joined, 0);
+    EXPECT_EQ(compress(compression, light).exact.scale_exponent, changed);
+  }
+  std::printf("rounding changes the light of single patches by %.3g, once they joined by %.3g\n",
+              before, after);
+  EXPECT_LT(after, 0.5 * before);
+}
+
+TEST(MatrixCompression, ALightThatShinesEverywhereLeavesTheScalesAsTheyAre) {
+  const DenseMatrix matrix(*room().dense);
+  const auto training = test::unshadowed_lights(room().patches, 24, 1, 2.2, 0.7);
+  const std::vector<Float3> light(room().patches.size(), Float3{1, 1, 1});
+  MatrixCompression compression(matrix, room().patches, training, {},
+                                {.equilibrated = true, .nested = true});
+  const auto before = compress(compression, light).exact.scale_exponent;
+  compression.add_training_light(ReferenceLighting(matrix, std::span(&light, 1)), 0);
+  EXPECT_EQ(compress(compression, light).exact.scale_exponent, before);
+}
+
+}  // namespace
+}  // namespace rebounce::test_matrix_compression
