@@ -64,6 +64,9 @@ constexpr std::size_t kFlatLinkBytes = sizeof(FormFactorLinks{}.pair[0]) +
                                        sizeof(FormFactorLinks{}.gradient[0]);
 constexpr std::size_t kLinkBytesKept = kFlatLinkBytes + LinkedFormFactors::kBytesPerLink + 14;
 
+// Links after those that are too coarse have been made finer, beside those that are forecast.
+constexpr double kFinerLinks = 1.25;
+
 // A patch beside links: compressed form factors and what they are fitted to, without the lights.
 constexpr std::size_t kPatchBytes = 3000;
 
@@ -187,9 +190,12 @@ CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
     estimate.peak_bytes = peak_bytes_of_pairs(scene, matrices, decided.operator_kind, decided.rank);
     return estimate;
   }
-  const LinkedBuild build{scene,      resident_memory_bytes(),
-                          link_count, matrices,
-                          roles,      kCompressionPart * decided.tolerance};
+  const LinkedBuild build{scene,
+                          resident_memory_bytes(),
+                          static_cast<std::size_t>(kFinerLinks * static_cast<double>(link_count)),
+                          matrices,
+                          roles,
+                          kCompressionPart * decided.tolerance};
   estimate.peak_bytes = peak_bytes_of_links(build);
   if (decided.operator_kind != OperatorKind::kNoOperator) {
     estimate.peak_bytes =
