@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "bench/support/machine.h"
 #include "bench/support/timing.h"
 #include "precompute/base/process_memory.h"
 #include "precompute/compression/form_factor_compression.h"

@@ -6,7 +6,6 @@
 #include <set>
 #include <string_view>
 
-#include "precompute/base/process_memory.h"
 #include "precompute/build/build_decisions.h"
 #include "precompute/build/build_estimate.h"
 #include "precompute/build/exchange_stage.h"
@@ -174,14 +173,13 @@ class TransferBuild {
   /// Reports the estimate, which what the build has taken so far is a part of. Throws Error if the
   /// rest needs more memory than allowed.
   void announce(CostEstimate& estimate) {
-    const std::uint64_t peak = peak_memory_bytes();
-    if (peak > peak_before_) estimate.peak_bytes = std::max(estimate.peak_bytes, peak);
+    count_taken(estimate, peak_before_);
     if (on_estimate_) on_estimate_(estimate);
     refuse_if_too_large(estimate, decided_.memory_limit_bytes, report_.triangle_count);
   }
 
   /// Of the process: a program that builds may have taken more before.
-  const std::uint64_t peak_before_ = peak_memory_bytes();
+  const std::uint64_t peak_before_ = peak_bytes_so_far();
   const BuildSettings& settings_;
   BuildSettings decided_;  ///< settings_ with everything decided
   BuildReport& report_;

@@ -221,6 +221,15 @@ CostEstimate estimate_after_links(const LinkedBuild& build, std::uint64_t limit_
   return estimate;
 }
 
+std::uint64_t peak_bytes_so_far() {
+  return peak_memory_bytes();
+}
+
+void count_taken(CostEstimate& estimate, std::uint64_t before) {
+  const std::uint64_t peak = peak_bytes_so_far();
+  if (peak > before) estimate.peak_bytes = std::max(estimate.peak_bytes, peak);
+}
+
 void refuse_if_too_large(const CostEstimate& estimate, std::uint64_t limit_bytes,
                          std::size_t triangle_count) {
   if (estimate.peak_bytes <= limit_bytes) return;

@@ -78,6 +78,12 @@ void sample_pairs(const PatchModel& model, const RayTracer& tracer, const BuildS
 /// The memory of the stages after links, once their number is known.
 CostEstimate estimate_after_links(const LinkedBuild& build, std::uint64_t limit_bytes);
 
+/// The most memory that the process has had so far.
+std::uint64_t peak_bytes_so_far();
+
+/// Raises an estimate to what the build has taken already, unless the process had more `before`.
+void count_taken(CostEstimate& estimate, std::uint64_t before);
+
 /// Throws Error if an estimate is above `limit_bytes`.
 void refuse_if_too_large(const CostEstimate& estimate, std::uint64_t limit_bytes,
                          std::size_t triangle_count);

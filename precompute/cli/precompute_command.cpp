@@ -15,12 +15,10 @@
 #include "precompute/cli/output_check.h"
 #include "precompute/cli/web_file.h"
 #include "precompute/import/light_file.h"
-#include "precompute/lights/validation_error.h"
 #include "precompute/patches/patch_selection.h"
 #include "rebounce/error.h"
 #include "transfer/base/precision.h"
 #include "transfer/file/transfer_file_io.h"
-#include "transfer/operator/hierarchical_operator.h"
 
 namespace rebounce::cli {
 namespace {

@@ -86,6 +86,30 @@ TEST(BuildEstimate, GrowsWithEverythingAndFallsWithReceiversAndSources) {
   EXPECT_EQ(bytes(beside), bytes(part) + 1000);
 }
 
+TEST(BuildEstimate, HoldsWhatTheBuildHasTakenAlready) {
+  const std::uint64_t peak = peak_bytes_so_far();
+  ASSERT_GT(peak, 0U);
+  ASSERT_GE(peak, resident_memory_bytes());
+  CostEstimate estimate;
+  count_taken(estimate, peak - 1);
+  EXPECT_GE(estimate.peak_bytes, peak);
+  CostEstimate of_before;  // the program had as much before the build began
+  count_taken(of_before, 2 * peak);
+  EXPECT_EQ(of_before.peak_bytes, 0U);
+}
+
+TEST(BuildEstimate, RowsOfReceiversAreAStageOfTheirOwn) {
+  constexpr std::size_t kPatches = 1000;
+  const auto bytes = [](std::uint64_t rows) {
+    return peak_bytes_of_pairs({.patch_count = kPatches, .row_bytes = rows}, 1,
+                               OperatorKind::kDense, 0);
+  };
+  constexpr std::uint64_t kFew = 1000, kMany = 1ULL << 30;
+  EXPECT_NEAR(static_cast<double>(bytes(kFew)), static_cast<double>(bytes(0)), 1e6);
+  EXPECT_GE(bytes(kMany), kMany);
+  EXPECT_LE(bytes(kMany), bytes(0) + kMany);
+}
+
 TEST(BuildEstimate, IsRefusedAboveTheLimit) {
   CostEstimate estimate;
   estimate.patch_count = 64000;
