@@ -19,6 +19,7 @@
 #include "rebounce/error.h"
 #include "transfer/base/precision.h"
 #include "transfer/file/transfer_file_io.h"
+#include "transfer/operator/hierarchical_operator.h"
 
 namespace rebounce::cli {
 namespace {
