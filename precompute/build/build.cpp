@@ -92,7 +92,8 @@ class TransferBuild {
     }
     decided_ = decide(settings_, model_);
     const bool links = decided_.exchange_source == ExchangeSource::kLinks;
-    const std::size_t link_count = links ? forecast_links(model_, tracer(), decided_, clock_) : 0;
+    std::size_t link_count = links ? forecast_links(model_, tracer(), decided_, clock_) : 0;
+    if (judges_links()) link_count = finer_link_count(link_count, model_.patches.size());
     report_.estimate = estimate_cost(model_, roles_, decided_, link_count);
     const bool fits = report_.estimate.peak_bytes <= decided_.memory_limit_bytes;
     if (fits && decided_.exchange_source == ExchangeSource::kPairs) forecast_pairs();
@@ -104,10 +105,9 @@ class TransferBuild {
   void find_exchange() {
     const bool links = decided_.exchange_source == ExchangeSource::kLinks;
     const bool operator_of_links = links && decided_.operator_kind != OperatorKind::kNoOperator;
-    const bool judged = operator_of_links && settings_.form_factors.link_epsilon == 0;
-    EscapedLight escaped =
-        links ? find_links(model_, tracer(), roles_, judged, decided_, data_, report_, clock_)
-              : find_pairs(model_, tracer(), decided_, data_, report_, clock_);
+    EscapedLight escaped = links ? find_links(model_, tracer(), roles_, judges_links(), decided_,
+                                              data_, report_, clock_)
+                                 : find_pairs(model_, tracer(), decided_, data_, report_, clock_);
     if (operator_of_links) {
       LinkedBuild build =
           linked_build(built_scene(model_, decided_), report_.link_count,
@@ -149,6 +149,13 @@ class TransferBuild {
   }
 
  private:
+  /// Whether links are judged by the light that an operator is fitted to, and made finer.
+  bool judges_links() const {
+    return decided_.exchange_source == ExchangeSource::kLinks &&
+           decided_.operator_kind != OperatorKind::kNoOperator &&
+           settings_.form_factors.link_epsilon == 0;
+  }
+
   /// Of the surfaces of the model, made once.
   const RayTracer& tracer() {
     if (!tracer_) tracer_.emplace(make_surface_tracer(model_.mesh));

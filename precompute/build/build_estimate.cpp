@@ -64,8 +64,9 @@ constexpr std::size_t kFlatLinkBytes = sizeof(FormFactorLinks{}.pair[0]) +
                                        sizeof(FormFactorLinks{}.gradient[0]);
 constexpr std::size_t kLinkBytesKept = kFlatLinkBytes + LinkedFormFactors::kBytesPerLink + 14;
 
-// Links after those that are too coarse have been made finer, beside those that are forecast.
-constexpr double kFinerLinks = 1.25;
+// How many more links there are once those that are too coarse have been made finer, as a part of
+// those that are forecast: it grows with the patches up to a limit (lab/137).
+constexpr double kPatchesOfTwice = 6000, kMostMoreLinks = 1.3;
 
 // A patch beside links: compressed form factors and what they are fitted to, without the lights.
 constexpr std::size_t kPatchBytes = 3000;
@@ -181,6 +182,11 @@ std::uint64_t memory_of_matrix_free_transfer(const LinkedBuild& build, std::uint
   return limit_bytes > beside ? limit_bytes - beside : 1;
 }
 
+std::size_t finer_link_count(std::size_t forecast, std::size_t patch_count) {
+  const double more = std::min(kMostMoreLinks, static_cast<double>(patch_count) / kPatchesOfTwice);
+  return static_cast<std::size_t>((1 + more) * static_cast<double>(forecast));
+}
+
 CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
                            const BuildSettings& decided, std::size_t link_count) {
   const BuiltScene scene = built_scene(model, decided);
@@ -190,12 +196,9 @@ CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
     estimate.peak_bytes = peak_bytes_of_pairs(scene, matrices, decided.operator_kind, decided.rank);
     return estimate;
   }
-  const LinkedBuild build{scene,
-                          resident_memory_bytes(),
-                          static_cast<std::size_t>(kFinerLinks * static_cast<double>(link_count)),
-                          matrices,
-                          roles,
-                          kCompressionPart * decided.tolerance};
+  const LinkedBuild build{scene,      resident_memory_bytes(),
+                          link_count, matrices,
+                          roles,      kCompressionPart * decided.tolerance};
   estimate.peak_bytes = peak_bytes_of_links(build);
   if (decided.operator_kind != OperatorKind::kNoOperator) {
     estimate.peak_bytes =

@@ -65,6 +65,10 @@ std::uint64_t peak_bytes_after_links(const LinkedBuild& build, std::uint64_t lim
 /// The part of a limit that remains for build_matrix_free_transfer; 1 if nothing remains.
 std::uint64_t memory_of_matrix_free_transfer(const LinkedBuild& build, std::uint64_t limit_bytes);
 
+/// The links that a build is likely to end with, which judges them and makes them finer, of those
+/// that are forecast at first.
+std::size_t finer_link_count(std::size_t forecast, std::size_t patch_count);
+
 /// The memory that form factors and operator need, without times. `decided`: settings that leave
 /// nothing open. `link_count` is forecast (forecast_link_count), and 0 for pairs.
 CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,

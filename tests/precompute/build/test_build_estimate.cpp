@@ -86,6 +86,13 @@ TEST(BuildEstimate, GrowsWithEverythingAndFallsWithReceiversAndSources) {
   EXPECT_EQ(bytes(beside), bytes(part) + 1000);
 }
 
+TEST(BuildEstimate, LinksThatAreMadeFinerAreMore) {
+  EXPECT_GT(finer_link_count(1000000, 2000), 1000000U);
+  EXPECT_GT(finer_link_count(1000000, 8000), finer_link_count(1000000, 2000));
+  EXPECT_EQ(finer_link_count(1000000, 64000), finer_link_count(1000000, 16000));
+  EXPECT_LT(finer_link_count(1000000, 1000000), 3000000U);
+}
+
 TEST(BuildEstimate, HoldsWhatTheBuildHasTakenAlready) {
   const std::uint64_t peak = peak_bytes_so_far();
   ASSERT_GT(peak, 0U);
