@@ -46,8 +46,10 @@ constexpr std::size_t kVertexBytes = 400, kWeighedBytes = 3000, kWeighedOfPatch 
 constexpr std::size_t kLibraryBytes = 2'000'000, kLibraryBytesOfPatch = 20'000,
                       kMostLibraryBytes = 12'000'000;
 
-// What each thread but the first takes beside that while an operator is compressed.
-constexpr std::size_t kThreadBytesOfPatch = 24'000, kMostThreadBytes = 11'000'000;
+// What each thread but the first takes beside that while an operator is compressed: the buffer of
+// OpenBLAS, as far as products fill it, or more where its blocks are larger (lab/137).
+constexpr std::size_t kBufferBytesOfPatch = 24'000, kBufferBytes = 11'000'000,
+                      kThreadBytesOfPatch = 14'000;
 
 // Copies of the factors of a low-rank operator while they are found.
 constexpr std::size_t kFactorCopies = 6;
@@ -65,8 +67,9 @@ constexpr std::size_t kFlatLinkBytes = sizeof(FormFactorLinks{}.pair[0]) +
 constexpr std::size_t kLinkBytesKept = kFlatLinkBytes + LinkedFormFactors::kBytesPerLink + 14;
 
 // How many more links there are once those that are too coarse have been made finer, as a part of
-// those that are forecast: it grows with the patches up to a limit (lab/137).
-constexpr double kPatchesOfTwice = 6000, kMostMoreLinks = 1.3;
+// those that are forecast: between none and 1.4 times, by the scene. What is said lies in between
+// and grows with the patches up to a limit (lab/137).
+constexpr double kPatchesOfTwice = 12'000, kMostMoreLinks = 0.6;
 
 // A patch beside links: compressed form factors and what they are fitted to, without the lights.
 constexpr std::size_t kPatchBytes = 3000;
@@ -94,7 +97,8 @@ std::uint64_t bytes_of_libraries(std::size_t patch_count) {
 
 std::uint64_t bytes_of_threads(std::size_t patch_count) {
   const auto others = static_cast<std::size_t>(omp_get_max_threads()) - 1;
-  return others * std::min(kMostThreadBytes, kThreadBytesOfPatch * patch_count);
+  return others * std::max(std::min(kBufferBytes, kBufferBytesOfPatch * patch_count),
+                           kThreadBytesOfPatch * patch_count);
 }
 
 std::uint64_t bytes_of_weights(const BuiltScene& scene) {

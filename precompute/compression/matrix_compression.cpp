@@ -166,6 +166,7 @@ void MatrixCompression::round_finer_where_lit() {
   const Eigen::VectorXd inverse = frame_.background.cwiseAbs2().cwiseInverse();
   const double usual =
       sample.rowwise().squaredNorm().dot(inverse) / static_cast<double>(sample.rows());
+  if (!(usual > 0)) return;
   std::vector<std::int8_t> more(exponent_.size(), 0);
   for (std::size_t i = 0; i < more.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);

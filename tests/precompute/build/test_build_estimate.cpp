@@ -90,13 +90,14 @@ TEST(BuildEstimate, LinksThatAreMadeFinerAreMore) {
   EXPECT_GT(finer_link_count(1000000, 2000), 1000000U);
   EXPECT_GT(finer_link_count(1000000, 8000), finer_link_count(1000000, 2000));
   EXPECT_EQ(finer_link_count(1000000, 64000), finer_link_count(1000000, 16000));
-  EXPECT_LT(finer_link_count(1000000, 1000000), 3000000U);
+  EXPECT_LT(finer_link_count(1000000, 1000000), 2000000U);
 }
 
 TEST(BuildEstimate, HoldsWhatTheBuildHasTakenAlready) {
   const std::uint64_t peak = peak_bytes_so_far();
   ASSERT_GT(peak, 0U);
-  ASSERT_GE(peak, resident_memory_bytes());
+  constexpr std::uint64_t kMiB = 1 << 20;  // the kernel counts the two apart
+  ASSERT_GE(peak + kMiB, resident_memory_bytes());
   CostEstimate estimate;
   count_taken(estimate, peak - 1);
   EXPECT_GE(estimate.peak_bytes, peak);

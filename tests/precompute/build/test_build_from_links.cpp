@@ -246,7 +246,7 @@ TEST(BuildFromLinks, LinksAreTakenWherePairsAreOverTheLimit) {
   if (!kGivesMemoryBack) GTEST_SKIP() << "the address sanitizer keeps memory that was freed";
   const auto peak_bytes = [&](ExchangeSource kind, std::uint64_t limit) {
     BuildSettings settings;
-    settings.subdivision.patch_count = 8000;  // of fewer, links do not take much less
+    settings.subdivision.patch_count = 9000;  // of fewer, links do not take much less
     settings.exchange_source = kind;
     settings.memory_limit_bytes = limit;
     std::uint64_t bytes = 0;
