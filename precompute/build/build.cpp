@@ -180,13 +180,12 @@ class TransferBuild {
   /// Reports the estimate, which what the build has taken so far is a part of. Throws Error if the
   /// rest needs more memory than allowed.
   void announce(CostEstimate& estimate) {
-    count_taken(estimate, peak_before_);
+    estimate.peak_bytes = std::max(estimate.peak_bytes, taken_.bytes());
     if (on_estimate_) on_estimate_(estimate);
     refuse_if_too_large(estimate, decided_.memory_limit_bytes, report_.triangle_count);
   }
 
-  /// Of the process: a program that builds may have taken more before.
-  const std::uint64_t peak_before_ = peak_bytes_so_far();
+  const TakenMemory taken_;
   const BuildSettings& settings_;
   BuildSettings decided_;  ///< settings_ with everything decided
   BuildReport& report_;

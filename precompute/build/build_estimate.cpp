@@ -27,8 +27,7 @@ constexpr std::size_t kEntryBytes = sizeof(std::uint32_t) + sizeof(float);
 // they are copied to.
 constexpr std::size_t kPairBytesMade = 3 * sizeof(ExchangeEntry) / 2 + kEntryBytes;
 
-// A pair beside an operator of pairs: in the matrix, and expanded to rows where it is inverted in
-// single precision or where the inverse is checked.
+// A pair beside a dense operator that is checked: in the matrix, and expanded to rows.
 constexpr std::size_t kPairBytesKept = 2 * kEntryBytes;
 
 // A patch while form factors are computed: its points, and what its hemisphere rays meet.
@@ -69,7 +68,7 @@ constexpr std::size_t kLinkBytesKept = kFlatLinkBytes + LinkedFormFactors::kByte
 // How many more links there are once those that are too coarse have been made finer, as a part of
 // those that are forecast: between none and 1.4 times, by the scene. What is said lies in between
 // and grows with the patches up to a limit (lab/137).
-constexpr double kPatchesOfTwice = 12'000, kMostMoreLinks = 0.6;
+constexpr double kMoreLinksOfPatch = 1.0 / 12'000, kMostMoreLinks = 0.6;
 
 // A patch beside links: compressed form factors and what they are fitted to, without the lights.
 constexpr std::size_t kPatchBytes = 3000;
@@ -187,7 +186,8 @@ std::uint64_t memory_of_matrix_free_transfer(const LinkedBuild& build, std::uint
 }
 
 std::size_t finer_link_count(std::size_t forecast, std::size_t patch_count) {
-  const double more = std::min(kMostMoreLinks, static_cast<double>(patch_count) / kPatchesOfTwice);
+  const double more =
+      std::min(kMostMoreLinks, kMoreLinksOfPatch * static_cast<double>(patch_count));
   return static_cast<std::size_t>((1 + more) * static_cast<double>(forecast));
 }
 
@@ -228,13 +228,11 @@ CostEstimate estimate_after_links(const LinkedBuild& build, std::uint64_t limit_
   return estimate;
 }
 
-std::uint64_t peak_bytes_so_far() {
-  return peak_memory_bytes();
-}
+TakenMemory::TakenMemory() : before_(peak_memory_bytes()) {}
 
-void count_taken(CostEstimate& estimate, std::uint64_t before) {
-  const std::uint64_t peak = peak_bytes_so_far();
-  if (peak > before) estimate.peak_bytes = std::max(estimate.peak_bytes, peak);
+std::uint64_t TakenMemory::bytes() const {
+  const std::uint64_t peak = peak_memory_bytes();
+  return peak > before_ ? peak : 0;
 }
 
 void refuse_if_too_large(const CostEstimate& estimate, std::uint64_t limit_bytes,

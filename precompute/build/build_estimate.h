@@ -82,11 +82,18 @@ void sample_pairs(const PatchModel& model, const RayTracer& tracer, const BuildS
 /// The memory of the stages after links, once their number is known.
 CostEstimate estimate_after_links(const LinkedBuild& build, std::uint64_t limit_bytes);
 
-/// The most memory that the process has had so far.
-std::uint64_t peak_bytes_so_far();
+/// The memory that a build has taken so far. It begins with this object: what the process had at
+/// its peak before is not the build's.
+class TakenMemory {
+ public:
+  TakenMemory();
 
-/// Raises an estimate to what the build has taken already, unless the process had more `before`.
-void count_taken(CostEstimate& estimate, std::uint64_t before);
+  /// The peak of the process, in bytes; 0 if it had as much before.
+  std::uint64_t bytes() const;
+
+ private:
+  std::uint64_t before_;
+};
 
 /// Throws Error if an estimate is above `limit_bytes`.
 void refuse_if_too_large(const CostEstimate& estimate, std::uint64_t limit_bytes,
