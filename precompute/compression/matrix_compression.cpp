@@ -75,15 +75,14 @@ std::vector<std::int8_t> CompressionFrame::balance() {
     const auto row = static_cast<Eigen::Index>(k);
     const double power = -std::round(std::log2(background[row]));
     exponent[k] = static_cast<std::int8_t>(power);
-    sample.row(row) *= std::exp2(power);
-    background[row] *= std::exp2(power);
   }
+  scale(exponent);
   return exponent;
 }
 
-void CompressionFrame::shift(std::span<const std::int8_t> by) {
-  for (std::size_t k = 0; k < by.size(); ++k) {
-    const double factor = std::exp2(-by[k]);
+void CompressionFrame::scale(std::span<const std::int8_t> exponent) {
+  for (std::size_t k = 0; k < exponent.size(); ++k) {
+    const double factor = std::exp2(exponent[k]);
     sample.row(static_cast<Eigen::Index>(k)) *= factor;
     background[static_cast<Eigen::Index>(k)] *= factor;
   }
@@ -167,18 +166,18 @@ void MatrixCompression::round_finer_where_lit() {
   const double usual =
       sample.rowwise().squaredNorm().dot(inverse) / static_cast<double>(sample.rows());
   if (!(usual > 0)) return;
-  std::vector<std::int8_t> more(exponent_.size(), 0);
-  for (std::size_t i = 0; i < more.size(); ++i) {
+  std::vector<std::int8_t> change(exponent_.size(), 0);
+  for (std::size_t i = 0; i < change.size(); ++i) {
     const auto row = static_cast<Eigen::Index>(i);
     const double value = sample(row, sample.cols() - 1);
     const double energy = value * value * inverse[row] / usual;
     if (!(energy > kConcentrated)) continue;
     const int wanted = std::min<int>(std::lround(std::log2(1 + energy) / 2), kFinest);
-    more[i] = static_cast<std::int8_t>(std::max(0, wanted - finer_[i]));
-    finer_[i] = static_cast<std::int8_t>(finer_[i] + more[i]);
-    exponent_[i] = static_cast<std::int8_t>(exponent_[i] - more[i]);
+    change[i] = static_cast<std::int8_t>(std::min(0, finer_[i] - wanted));
+    finer_[i] = static_cast<std::int8_t>(finer_[i] - change[i]);
+    exponent_[i] = static_cast<std::int8_t>(exponent_[i] + change[i]);
   }
-  frame_.shift(more);
+  frame_.scale(change);
   equilibrated_.emplace(matrix_, by_patch(exponent_, frame_.tree));
 }
 

@@ -34,8 +34,8 @@ struct CompressionFrame {
   /// lights is about 1: x becomes R x. Returns the exponents of R, powers of two, by position.
   std::vector<std::int8_t> balance();
 
-  /// Changes the coordinates again: x becomes 2^-`by` x, by position.
-  void shift(std::span<const std::int8_t> by);
+  /// Changes the coordinates: x becomes 2^`exponent` x, by position.
+  void scale(std::span<const std::int8_t> exponent);
 
   std::vector<ClusterWeight> weights() const {
     return make_cluster_weights(tree.clusters, sample, background, roles);
