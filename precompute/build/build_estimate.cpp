@@ -231,8 +231,9 @@ CostEstimate estimate_after_links(const LinkedBuild& build, std::uint64_t limit_
 TakenMemory::TakenMemory() : before_(peak_memory_bytes()) {}
 
 std::uint64_t TakenMemory::bytes() const {
+  constexpr std::uint64_t kMiB = 1 << 20;  // more than it takes to ask for the peak
   const std::uint64_t peak = peak_memory_bytes();
-  return peak > before_ ? peak : 0;
+  return peak > before_ + kMiB ? peak : 0;
 }
 
 void refuse_if_too_large(const CostEstimate& estimate, std::uint64_t limit_bytes,

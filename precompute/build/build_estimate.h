@@ -88,7 +88,7 @@ class TakenMemory {
  public:
   TakenMemory();
 
-  /// The peak of the process, in bytes; 0 if it had as much before.
+  /// The peak of the process, in bytes; 0 if it had as much before, to a MiB.
   std::uint64_t bytes() const;
 
  private:

@@ -163,15 +163,31 @@ class Session {
   rebounce_transfer*& transfer() { return transfers_[choices_.below(kHandles)]; }
   rebounce_engine*& engine() { return engines_[choices_.below(kHandles)]; }
 
+  // Mostly another handle of one that is there: reading takes longer than all other calls.
   void read_transfer() {
     rebounce_transfer*& handle = transfer();
     rebounce_transfer_release(handle);
-    const std::size_t size =
-        choices_.byte() < 224 ? room().size() : choices_.word() % room().size();
+    const std::uint8_t choice = choices_.byte();
+    if (choice < 224) {
+      handle = read_once();
+      rebounce_transfer_retain(handle);
+    } else {
+      handle = read_room(choice < 240 ? room().size() : choices_.word() % room().size());
+    }
+  }
+
+  static rebounce_transfer* read_once() {
+    static rebounce_transfer* const transfer = read_room(room().size());
+    return transfer;
+  }
+
+  static rebounce_transfer* read_room(std::size_t size) {
     const std::vector<char> bytes(room().begin(),
                                   room().begin() + static_cast<std::ptrdiff_t>(size));
+    rebounce_transfer* handle = nullptr;
     const rebounce_status status = rebounce_transfer_read(bytes.data(), size, "room", &handle);
     require(good(status) == (handle != nullptr), "a handle if and only if it was read");
+    return handle;
   }
 
   void end_transfer() {
