@@ -55,7 +55,8 @@ def precompute(name, *options, outputs=("room.safetensors",), folders=()):
 
 
 def commands(transfer):
-    from_links = ("--patches", "60", "--form-factors", "links", "--tolerance", "0.05")
+    from_links = ("--patches", "60", "--form-factors", "links", "--tolerance", "0.05",
+                  "--quality", "low", "--receivers-at", "patches")
     return [
         precompute("precompute", "--patches", "40", "--probes", "2,2,2", "--quality", "low",
                    "--surface-harmonics", "16"),

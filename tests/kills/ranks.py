@@ -5,7 +5,7 @@ Any number of ranks gives the bytes of one process. A rank that is killed ends t
 status that is not 0 and without half a file, and the same command with another number of ranks goes
 on from the checkpoint, to the same bytes.
 
-Usage: ranks.py PROGRAM WORK [--moments N] [--most RANKS] [--seed S]
+Usage: ranks.py PROGRAM WORK [--moments N] [--stages N] [--most RANKS] [--seed S]
 """
 
 import os
@@ -104,6 +104,7 @@ def kill_and_go_on(program, folder, known, draw, most, moment):
 def main():
     parser = kills.argument_parser(__doc__.splitlines()[0], moments=1)
     parser.add_argument("--most", type=int, default=3, help="ranks at most, 2 or more")
+    parser.add_argument("--stages", type=int, help="so many, drawn at random; all if left out")
     options = parser.parse_args()
     program, work, draw = kills.prepared(options)
     folder = work / "out"
@@ -114,9 +115,10 @@ def main():
         run(count, program, folder)
         kills.check_whole(COMMAND, folder, known.files)
         print(f"{count} ranks: the bytes of one process", flush=True)
-    for name, first, last in known.stages:
-        if name == kills.WRITING:
-            continue
+    stages = [stage for stage in known.stages if stage[0] != kills.WRITING]
+    if options.stages is not None:
+        stages = draw.sample(stages, min(options.stages, len(stages)))
+    for name, first, last in stages:
         killed = 0
         for _ in range(options.moments):
             try:

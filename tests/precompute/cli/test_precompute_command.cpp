@@ -152,7 +152,7 @@ TEST_F(PrecomputeCommand, RecordsTheSettingsThatApply) {
 TEST_F(PrecomputeCommand, CompressesToATolerance) {
   const Words words = {"precompute",  kScene, "--patches", "1200",
                        "--tolerance", "0.02", "-o",        path("box.safetensors")};
-  const json info = summary_of(words);
+  const json info = summary_of(test::quick(words));
   EXPECT_EQ(info["operator"], "hierarchical");
   EXPECT_EQ(info["tolerance"], 0.02);
   EXPECT_LT(info["error_mean"].get<double>(), 0.02);
@@ -168,7 +168,7 @@ TEST_F(PrecomputeCommand, AdvisesWhereAPatchTakesManyBytes) {
   const auto said = [&](const Words& options) {
     Words words = {"precompute", kScene, "--patches", "300", "-o", path("box.safetensors")};
     words.insert(words.end(), options.begin(), options.end());
-    return run(words).out;
+    return run(test::quick(words)).out;
   };
   EXPECT_EQ(said({}).find("advice: "), std::string::npos);
   const std::string many = said({"--precision", "f32", "--tolerance", "0.0005"});
@@ -178,9 +178,10 @@ TEST_F(PrecomputeCommand, AdvisesWhereAPatchTakesManyBytes) {
 
 TEST_F(PrecomputeCommand, AMissedToleranceFails) {
   // Half precision cannot be this exact.
-  expect_failure({"precompute", kScene, "--patches", "300", "--operator", "hierarchical",
-                  "--tolerance", "0.00001", "-o", path("box.safetensors"), "--quiet"},
-                 "misses its tolerance");
+  expect_failure(
+      test::quick({"precompute", kScene, "--patches", "300", "--operator", "hierarchical",
+                   "--tolerance", "0.00001", "-o", path("box.safetensors"), "--quiet"}),
+      "misses its tolerance");
   EXPECT_GT(summary_of({"info", path("box.safetensors")})["error_mean"].get<double>(), 1e-5);
 }
 
@@ -197,8 +198,8 @@ TEST_F(PrecomputeCommand, FailsIfALampIsAboveThreeTimesTheTolerance) {
 }
 
 TEST_F(PrecomputeCommand, FormFactorsThatMissTheirToleranceFail) {
-  expect_failure({"precompute", kScene, "--patches", "300", "--compress-form-factors", "0.00001",
-                  "-o", path("box.safetensors"), "--quiet"},
+  expect_failure(test::quick({"precompute", kScene, "--patches", "300", "--compress-form-factors",
+                              "0.00001", "-o", path("box.safetensors"), "--quiet"}),
                  "miss their tolerance");
   const json report = summary_of({"info", path("box.safetensors")})["report"];
   EXPECT_GT(report["form_factor_error_mean"].get<double>(), 1e-5);
@@ -229,8 +230,8 @@ TEST_F(PrecomputeCommand, RelightsByOperatorsOfLowRank) {
 }
 
 TEST_F(PrecomputeCommand, MeetsThePatchSize) {
-  const json made = summary_of(
-      {"precompute", kScene, "--patch-size", "0.1", "-o", path("box.safetensors"), "--quiet"});
+  const json made = summary_of(test::quick(
+      {"precompute", kScene, "--patch-size", "0.1", "-o", path("box.safetensors"), "--quiet"}));
   // The surfaces measure 2.1 m2; the largest patch of that length is a square, the smallest a right
   // triangle half as long.
   EXPECT_GT(made["patch_count"].get<int>(), 2.1 / 0.005);
@@ -290,16 +291,20 @@ TEST_F(PrecomputeCommand, PairsHaveNoErrorOfALink) {
 
 TEST_F(PrecomputeCommand, QualitySetsTheRaysOfFormFactors) {
   const json low = summary_of({"info", precompute("low.safetensors", {"--quality", "low"})});
-  const json usual = summary_of({"info", precompute("usual.safetensors")});
+  const json usual =
+      summary_of({"info", precompute("usual.safetensors", {"--quality", "default"})});
   EXPECT_EQ(low["settings"]["hemisphere_rays"], 1024);
   EXPECT_EQ(low["settings"]["full_rays"], 16);
   EXPECT_EQ(usual["settings"]["hemisphere_rays"], 4096);
 }
 
 TEST_F(PrecomputeCommand, GivesTheSameBytesForAnyNumberOfThreads) {
-  const std::string one = test::read_bytes(precompute("1.safetensors", {"--threads", "1"}));
-  EXPECT_EQ(one, test::read_bytes(precompute("2.safetensors", {"--threads", "2"})));
-  EXPECT_EQ(one, test::read_bytes(precompute("5.safetensors", {"--threads", "5"})));
+  const auto as_by_default = [](const char* threads) {
+    return Words{"--threads", threads, "--quality", "default", "--receivers-at", "where-needed"};
+  };
+  const std::string one = test::read_bytes(precompute("1.safetensors", as_by_default("1")));
+  EXPECT_EQ(one, test::read_bytes(precompute("2.safetensors", as_by_default("2"))));
+  EXPECT_EQ(one, test::read_bytes(precompute("5.safetensors", as_by_default("5"))));
 }
 
 TEST_F(PrecomputeCommand, TheSeedDecides) {
@@ -341,7 +346,8 @@ TEST_F(PrecomputeCommand, StopsCleanlyWhenInterrupted) {
 }
 
 TEST_F(PrecomputeCommand, PutsProbesIntoTheFile) {
-  const Words words = {"precompute", kScene, "--patches", "300", "-o", path("p.safetensors")};
+  const Words words =
+      test::quick({"precompute", kScene, "--patches", "300", "-o", path("p.safetensors")});
   const auto with = [&](const std::string& probes) {
     Words more = words;
     more.insert(more.end(), {"--probes", probes});
@@ -358,10 +364,10 @@ TEST_F(PrecomputeCommand, PutsProbesIntoTheFile) {
 
 TEST_F(PrecomputeCommand, StoresReceiversAndSourcesAlone) {
   const std::string file = path("box.safetensors"), solution = path("x.csv");
-  const json made =
-      summary_of({"precompute", kScene, "--patches", "600", "--receivers", "mesh:floor,tall block",
-                  "--receivers", "box:0,0,0,1,0.1,1", "--sources", "ceiling,material:red",
-                  "--store-form-factors", "-o", file});
+  const json made = summary_of(
+      test::quick({"precompute", kScene, "--patches", "600", "--receivers", "mesh:floor,tall block",
+                   "--receivers", "box:0,0,0,1,0.1,1", "--sources", "ceiling,material:red",
+                   "--store-form-factors", "-o", file}));
   EXPECT_EQ(made["operator"], "hierarchical");
   const json info = summary_of({"info", file});
   const auto n = info["patch_count"].get<std::size_t>();

@@ -32,8 +32,8 @@ const Words kSetups = {"own_lamp", "ceiling_point", "coloured_pair", "spot_on_re
 TEST_F(SolveCommand, IteratesOnCompressedFormFactors) {
   const std::string file = path("box.safetensors");
   const json info =
-      summary_of({"precompute", kScene, "--patches", "1200", "--compress-form-factors", "0.002",
-                  "--store-form-factors", "-o", file});
+      summary_of(test::quick({"precompute", kScene, "--patches", "1200", "--compress-form-factors",
+                              "0.002", "--store-form-factors", "-o", file}));
   EXPECT_GT(info["compressed_form_factor_bytes"].get<double>(), 0);
   EXPECT_LT(info["report"]["form_factor_error_mean"].get<double>(), 0.002);
   const std::string exact = path("exact.csv"), compressed = path("compressed.csv");
@@ -261,7 +261,8 @@ TEST_F(SolveCommand, WarnsOfALampThatLightsNothing) {
 
 TEST_F(SolveCommand, SaysWhatToDoWhereThereIsNoLight) {
   const std::string file = path("dark.safetensors");
-  summary_of({"precompute", kScenes + "two_rooms.gltf", "--patches", "60", "-o", file});
+  summary_of(
+      test::quick({"precompute", kScenes + "two_rooms.gltf", "--patches", "60", "-o", file}));
   expect_refused({"solve", file, "-o", path("x.csv")}, "name a file with --lights");
   const std::string none = write("none.lights.json", R"({"lights": []})");
   expect_refused({"solve", file, "--lights", none, "-o", path("x.csv")},
@@ -329,7 +330,7 @@ TEST_F(SolveCommand, TakesLightsFromAGlb) {
   EXPECT_EQ(test::read_bytes(path("glb.csv")), test::read_bytes(path("json.csv")));
 
   const std::string lit = path("lit.safetensors");
-  summary_of({"precompute", scene, "--patches", "300", "-o", lit});
+  summary_of(test::quick({"precompute", scene, "--patches", "300", "-o", lit}));
   summary_of({"solve", lit, "-o", path("own.csv")});
   summary_of({"solve", lit, "--lights", kLights, "-o", path("given.csv")});
   EXPECT_EQ(test::read_bytes(path("own.csv")), test::read_bytes(path("given.csv")));
@@ -338,8 +339,8 @@ TEST_F(SolveCommand, TakesLightsFromAGlb) {
 TEST_F(SolveCommand, RefusesToRelightWithoutAnyLight) {
   json dark = json::parse(test::read_bytes(kScene));
   for (json& material : dark["materials"]) material.erase("emissiveFactor");
-  summary_of({"precompute", write("dark.gltf", dark.dump()), "--patches", "300", "-o",
-              path("dark.safetensors")});
+  summary_of(test::quick({"precompute", write("dark.gltf", dark.dump()), "--patches", "300", "-o",
+                          path("dark.safetensors")}));
   expect_refused({"solve", path("dark.safetensors"), "-o", path("x.csv")}, "--lights");
   // A picture may have a lamp of its own.
   summary_of(

@@ -83,8 +83,8 @@ class ViewCommand : public CommandLine {
     }
     file_ = path("box.safetensors");
     // As few patches as show colours bleed: it is the drawing that is looked at.
-    ASSERT_EQ(run({"precompute", kScene, "--patches", "120", "--store-form-factors", "--quiet",
-                   "-o", file_})
+    ASSERT_EQ(run(test::quick({"precompute", kScene, "--patches", "120", "--store-form-factors",
+                               "--quiet", "-o", file_}))
                   .exit_code,
               kDone);
     const Outcome outcome =
@@ -107,8 +107,8 @@ class ViewCommand : public CommandLine {
   /// A furnished room of few patches.
   std::string furnished_room() {
     std::string room = path("room.safetensors");
-    EXPECT_EQ(run({"precompute", kScenes + "furnished_room.gltf", "--patches", "300", "--quality",
-                   "low", "--tolerance", "0.05", "--quiet", "-o", room})
+    EXPECT_EQ(run(test::quick({"precompute", kScenes + "furnished_room.gltf", "--patches", "300",
+                               "--tolerance", "0.05", "--quiet", "-o", room}))
                   .exit_code,
               kDone);
     return room;
@@ -296,8 +296,9 @@ TEST_F(ViewCommand, WhatIsMaskedAwayIsNotDrawn) {
     return read_image(picture);
   };
   const std::string file = path("masked.safetensors");
-  ASSERT_EQ(run({"precompute", masked, "--patches", "120", "--quiet", "-o", file}).exit_code,
-            kDone);
+  ASSERT_EQ(
+      run(test::quick({"precompute", masked, "--patches", "120", "--quiet", "-o", file})).exit_code,
+      kDone);
   const Image image = draw({"view", file, "--screenshot", path("masked.png")}, path("masked.png"));
   const Image drawn = draw({"render", file, "-o", path("render.png")}, path("render.png"));
   EXPECT_LT(difference(image, drawn).mean, 2.0);
@@ -384,8 +385,9 @@ TEST_F(ViewCommand, ShowsTheErrorOfAnIteration) {
 
 TEST_F(ViewCommand, ComparesOnlyWhereThereAreFormFactors) {
   const std::string file = path("without.safetensors");
-  ASSERT_EQ(run({"precompute", kScene, "--patches", "120", "--quiet", "-o", file}).exit_code,
-            kDone);
+  ASSERT_EQ(
+      run(test::quick({"precompute", kScene, "--patches", "120", "--quiet", "-o", file})).exit_code,
+      kDone);
   const Words words = {"view",   file,    "--lights",     kLights,
                        "--size", "32x24", "--screenshot", path("without.png")};
   for (const Words& what : {Words{"--show", "error"}, Words{"--against", "refine"},
