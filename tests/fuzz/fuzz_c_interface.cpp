@@ -254,7 +254,8 @@ class Session {
     for (std::size_t k = 0; k < count; ++k) {
       const rebounce_light filled = light();
       std::memcpy(lights.get() + k * stride, &filled, std::min(stride, sizeof(filled)));
-      const std::uint32_t stated = choices_.byte() < 250 ? size : choices_.word();
+      // The first entry says how far apart all are.
+      const std::uint32_t stated = k == 0 || choices_.byte() < 250 ? size : choices_.word();
       std::memcpy(lights.get() + k * stride, &stated, sizeof(stated));
     }
     rebounce_sky sky{{1, 1, 1}, 100};
