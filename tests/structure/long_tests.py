@@ -17,7 +17,10 @@ LONG_FOR_THE_SHORTEST = 10
 
 def seconds_of_tests(build):
     """Of each test, from what ctest keeps for its next run: NAME RUNS SECONDS, and then `---`."""
-    lines = (build / "Testing/Temporary/CTestCostData.txt").read_text().partition("---")[0]
+    costs = build / "Testing/Temporary/CTestCostData.txt"
+    if not costs.exists():
+        sys.exit(f"{costs} is missing; run the tests of that build first: ./dev test")
+    lines = costs.read_text().partition("---")[0]
     return {name: float(seconds) for name, _, seconds in map(str.split, lines.splitlines())}
 
 
