@@ -56,11 +56,11 @@ def precompute(name, *options, outputs=("room.safetensors",), folders=()):
 
 def commands(transfer):
     from_links = ("--patches", "60", "--form-factors", "links", "--tolerance", "0.05",
-                  "--quality", "low", "--receivers-at", "patches")
+                  "--quality", "low")
     return [
         precompute("precompute", "--patches", "40", "--probes", "2,2,2", "--quality", "low",
                    "--surface-harmonics", "16"),
-        precompute("precompute from links", *from_links),
+        precompute("precompute from links", *from_links, "--receivers-at", "patches"),
         precompute("precompute with --checkpoint", *from_links, "--checkpoint", "OUT/parts",
                    folders=["parts"]),
         precompute("precompute for pages", "--patches", "40", "--for", "web", "--quality", "low",

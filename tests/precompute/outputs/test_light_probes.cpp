@@ -36,8 +36,8 @@ struct ProbeErrors {
 ProbeErrors errors_of_probes(const Engine& engine) {
   const TransferData& data = engine.data();
   const LightProbes& probes = data.probes;
-  std::vector<Float3> normals(9);
-  write_octahedral_normals(3, normals);
+  std::vector<Float3> normals(36);
+  write_octahedral_normals(6, normals);
   std::vector<ProbeLight> light(probes.size());
   std::vector<Float3> irradiance(probes.size() * normals.size());
   apply_probes(probes, engine.radiosity(), {}, light);
