@@ -9,13 +9,14 @@ import argparse
 import csv
 import dataclasses
 import pathlib
+import statistics
 import sys
 
 import aims
 import claims as claims_module
 import results
 import summary
-from formats import span
+from formats import span, times
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 RESULTS = "bench/results/*/report.csv"
@@ -91,25 +92,36 @@ def readme_line(report):
     shown = next(
         h for h in report.headlines if (h.result.scene, h.result.patches) == (SCENE, PATCHES)
     )
-    parts = []
-    for error in (COARSE, FINE):
-        condition = f"{results.SWITCHED}, error {error:g}"
-        claim = claims_module.find(shown.claims, "equal error", condition)
-        parts.append(
-            f"{duration(claim.inverse_value)} to an error of {results.percent(error)} "
-            f"(Gauss-Seidel: {duration(claim.rival_value)})"
-        )
     patches = [h.result.patches for h in report.headlines]
     scenes = {h.result.scene for h in report.headlines}
+    switches = [h.switch for h in report.headlines if h.switch is not None]
+    repainted = [r for h in report.headlines if (r := aims.ratio_of(h.claims, "equal error", summary.REPAINTED))]
     return (
         f"**Figures.** {SCENE.replace('_', ' ').capitalize()}, {PATCHES:,} patches, one thread of an "
-        f"{report.processor}: the light of a lamp that was just switched on, with all bounces, takes "
-        f"{parts[0]}, {parts[1]}. "
-        f"Over {len(scenes)} scenes of {min(patches):,} to {max(patches):,} patches the product is "
-        f"{span([h.switch for h in report.headlines])} times faster to {results.percent(aims.AIM_ERROR)}, and "
+        f"{report.processor}: the bounced light of a lamp that was just switched on takes "
+        f"{times_to(shown, COARSE)} and {times_to(shown, FINE)} of the exact solution on these patches. "
+        f"A whole frame to {results.percent(COARSE)} takes {duration(frame_of(shown, COARSE))}. "
+        f"Over {len(scenes)} scenes of {min(patches):,} to {max(patches):,} patches, "
+        f"to {results.percent(aims.AIM_ERROR)}, the product is {span(switches)} times faster than Gauss-Seidel (median {times(statistics.median(switches))}), "
+        f"{span([h.warm for h in report.headlines])} times after a lamp moved a little, and "
         f"{span([h.switch_any for h in report.headlines])} times faster than the best iteration of any kind. "
+        f"After a repaint, when the product must be refined, iteration takes {span(repainted)} of its time. "
         f"[All figures, and where Gauss-Seidel wins]({PAGE})."
     )
+
+
+def times_to(headline, error):
+    claim = headline.equal_error(error)
+    return (
+        f"{duration(claim.inverse_value)} to within {results.percent(error)} "
+        f"(Gauss-Seidel: {duration(claim.rival_value)})"
+    )
+
+
+def frame_of(headline, error):
+    """Microseconds of a whole frame after a switch."""
+    condition = f"{results.SWITCHED}, error {error:g}"
+    return claims_module.find(headline.claims, "whole frame", condition).inverse_value
 
 
 def page(found, root=ROOT):
