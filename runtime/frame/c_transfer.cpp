@@ -168,7 +168,8 @@ const uint8_t* rebounce_transfer_probe_valid(const rebounce_transfer* transfer) 
 
 const float* rebounce_transfer_lightmap_texcoord(const rebounce_transfer* transfer) {
   if (transfer == nullptr || transfer->data->lightmap.empty()) return nullptr;
-  return transfer->data->lightmap.texcoord.front().data();
+  const std::vector<Float2>& texcoord = transfer->data->lightmap.texcoord;
+  return texcoord.empty() ? nullptr : texcoord.front().data();
 }
 const uint8_t* rebounce_transfer_lightmap_triangle(const rebounce_transfer* transfer) {
   if (transfer == nullptr || transfer->data->lightmap.empty()) return nullptr;

@@ -14,7 +14,8 @@ namespace rebounce {
 namespace {
 
 std::shared_ptr<const TransferData> checked(std::shared_ptr<const TransferData> data) {
-  if (!data || !data->transfer) throw Error("the transfer data have no operator");
+  if (!data) throw Error("there are no transfer data; load a file first");
+  if (!data->transfer) throw Error("the transfer data have no operator; make a file with one");
   return data;
 }
 
@@ -32,7 +33,7 @@ void check_lights(std::span<const Light> lights) {
 
 OneThread::OneThread(EngineUse& use) : use_(use) {
   if (!use_.busy.exchange(true, std::memory_order_acquire)) return;
-  throw Error("two threads use one engine at the same time; give each a copy of it");
+  throw Error("two threads use one engine at the same time; give each one of its own");
 }
 
 OneThread::~OneThread() {

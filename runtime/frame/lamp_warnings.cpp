@@ -57,6 +57,7 @@ std::string described(std::size_t number, const Light& light) {
 }  // namespace
 
 std::vector<std::string> lamp_warnings(const Engine& engine, std::span<const Light> lights) {
+  check_lights(lights);
   std::vector<std::string> warnings;
   const DisplayMesh& mesh = engine.data().mesh;
   Engine alone(engine);

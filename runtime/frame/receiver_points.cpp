@@ -11,7 +11,10 @@ namespace rebounce {
 
 std::vector<ReceiverPoint> receiver_points(const TransferData& data,
                                            const DirectLightingSettings& settings) {
-  if (settings.points_per_patch < 1) throw Error("direct light needs at least one point per patch");
+  if (settings.points_per_patch < 1) {
+    throw Error("points_per_patch is " + std::to_string(settings.points_per_patch) +
+                "; it must be at least 1");
+  }
   const auto points_per_patch = static_cast<std::size_t>(settings.points_per_patch);
   const std::size_t n = data.patches.size();
   const float offset = ray_offset_distance(data.mesh.position);

@@ -11,9 +11,13 @@ namespace rebounce {
 namespace {
 
 void check_settings(const DirectLightingSettings& settings) {
+  if (settings.light_capacity < 0) {
+    throw Error("light_capacity is " + std::to_string(settings.light_capacity) +
+                "; it must be at least 0");
+  }
   if (settings.area_light_samples < 1 || settings.area_light_samples > kMaxAreaLightSamples) {
-    throw Error("direct light needs from 1 to " + std::to_string(kMaxAreaLightSamples) +
-                " samples of lamps with a surface");
+    throw Error("area_light_samples is " + std::to_string(settings.area_light_samples) +
+                "; it must be from 1 to " + std::to_string(kMaxAreaLightSamples));
   }
 }
 

@@ -14,6 +14,7 @@
 
 struct rebounce_gpu_engine {
   rebounce::GpuEngine engine;
+  std::vector<rebounce::GpuLamp> lamps{};  ///< of the current frame
 };
 
 // NOLINTEND(readability-identifier-naming)
@@ -124,9 +125,9 @@ rebounce_status rebounce_gpu_engine_light_patches(rebounce_gpu_engine* engine,
     return missing("rebounce_gpu_engine_light_patches");
   }
   return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
-    std::vector<GpuLamp> taken;
-    for (std::size_t k = 0; k < lamp_count; ++k) taken.push_back(gpu_lamp_at(lamps, k));
-    engine->engine.light_patches(taken, direct_irradiance, others);
+    engine->lamps.clear();
+    for (std::size_t k = 0; k < lamp_count; ++k) engine->lamps.push_back(gpu_lamp_at(lamps, k));
+    engine->engine.light_patches(engine->lamps, direct_irradiance, others);
     return REBOUNCE_OK;
   });
 }

@@ -114,7 +114,7 @@ StorageBuffer::StorageBuffer(std::shared_ptr<const GlFunctions> gl, std::size_t 
   gl_->gen_buffers(1, &name_);
   gl_->bind_buffer(Gl::kStorageBuffer, name_);
   try {
-    allocate(data, Gl::kStaticDraw);
+    allocate(size_, data, Gl::kStaticDraw);
   } catch (const Error&) {
     gl_->delete_buffers(1, &name_);
     throw;
@@ -130,12 +130,12 @@ void StorageBuffer::write(std::size_t size, const void* data) const {
   gl_->buffer_sub_data(Gl::kStorageBuffer, 0, static_cast<std::ptrdiff_t>(size), data);
 }
 
-void StorageBuffer::allocate(const void* data, GlFunctions::Enum usage) const {
+void StorageBuffer::allocate(std::size_t size, const void* data, GlFunctions::Enum usage) const {
   for (int k = 0; k < kMostErrors && gl_->get_error() != 0; ++k) {
   }
-  gl_->buffer_data(Gl::kStorageBuffer, static_cast<std::ptrdiff_t>(size_), data, usage);
+  gl_->buffer_data(Gl::kStorageBuffer, static_cast<std::ptrdiff_t>(size), data, usage);
   if (gl_->get_error() == Gl::kOutOfMemory) {
-    throw Error("the graphics card has no memory for a table of " + std::to_string(size_) +
+    throw Error("the graphics card has no memory for a table of " + std::to_string(size) +
                 " bytes");
   }
 }
@@ -143,8 +143,9 @@ void StorageBuffer::allocate(const void* data, GlFunctions::Enum usage) const {
 void StorageBuffer::replace(std::size_t size, const void* data) {
   gl_->bind_buffer(Gl::kStorageBuffer, name_);
   if (size > size_) {
+    size_ = 0;  // after an error the next call tries again
+    allocate(size, nullptr, Gl::kStreamDraw);
     size_ = size;
-    allocate(nullptr, Gl::kStreamDraw);
   }
   gl_->buffer_sub_data(Gl::kStorageBuffer, 0, static_cast<std::ptrdiff_t>(size), data);
 }

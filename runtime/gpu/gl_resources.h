@@ -86,7 +86,7 @@ class StorageBuffer {
   void replace(std::size_t size, const void* data);
 
  private:
-  void allocate(const void* data, GlFunctions::Enum usage) const;
+  void allocate(std::size_t size, const void* data, GlFunctions::Enum usage) const;
 
   std::shared_ptr<const GlFunctions> gl_;
   unsigned name_ = 0;

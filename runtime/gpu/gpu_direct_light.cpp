@@ -247,7 +247,7 @@ void GpuDirectLight::run(std::span<const GpuLamp> lamps, unsigned others,
     return (k + 1) % kRunsAtOnce == 0 || k + 1 == run_count;
   };
   const auto of_run = static_cast<std::uint32_t>(kChannelCount * patch_count_);
-  std::vector<unsigned char> blocks(run_count * kRunStride);
+  blocks_.assign(run_count * kRunStride, 0);
   for (std::size_t k = 0; k < run_count; ++k) {
     RunBlock block;
     std::ranges::transform(lamps_of(k), block.lamps.begin(), block_of);
@@ -259,9 +259,9 @@ void GpuDirectLight::run(std::span<const GpuLamp> lamps, unsigned others,
                    static_cast<std::uint32_t>(lamps_of(k).size()),
                    static_cast<std::uint32_t>(is_last(k) ? before : Before::kNothing)};
     block.runs = is_last(k) ? Words{0, own_place, of_run} : Words{own_place * of_run, 0, of_run};
-    std::memcpy(blocks.data() + k * kRunStride, &block, sizeof(block));
+    std::memcpy(blocks_.data() + k * kRunStride, &block, sizeof(block));
   }
-  runs_.replace(blocks.size(), blocks.data());
+  runs_.replace(blocks_.size(), blocks_.data());
   gl_->bind_buffer_base(Gl::kStorageBuffer, 0, points_.name());
   gl_->bind_buffer_base(Gl::kStorageBuffer, 2, others);
   gl_->bind_buffer_base(Gl::kStorageBuffer, 3, of_runs_.name());

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "rebounce/engine.h"
 #include "runtime/gpu/gl_resources.h"
@@ -33,8 +34,9 @@ class GpuDirectLight {
   std::size_t patch_count_, points_per_patch_;
   ComputeProgram program_;
   StorageBuffer points_, runs_;
-  StorageBuffer of_runs_;          ///< [run][patch][3], of runs that do not wait for each other
-  unsigned samplers_[2] = {0, 0};  ///< for depth that grows with distance, and that falls
+  StorageBuffer of_runs_;              ///< [run][patch][3], of runs that do not wait for each other
+  unsigned samplers_[2] = {0, 0};      ///< for depth that grows with distance, and that falls
+  std::vector<unsigned char> blocks_;  ///< of the runs of a frame, as `runs_` takes them
 };
 
 }  // namespace rebounce

@@ -2,6 +2,7 @@
 #include <array>
 #include <bit>
 #include <cstring>
+#include <initializer_list>
 #include <string>
 #include <utility>
 #include <vector>
@@ -255,10 +256,9 @@ struct GpuEngine::Parts {
                       buffers.vertex_irradiance, buffers.lightmap_irradiance, buffers.probe_light});
   }
 
-  static void check_all_differ(std::vector<unsigned> names) {
-    std::ranges::sort(names);
-    for (std::size_t k = 1; k < names.size(); ++k) {
-      if (names[k] != 0 && names[k] == names[k - 1]) {
+  static void check_all_differ(std::initializer_list<unsigned> names) {
+    for (const unsigned name : names) {
+      if (name != 0 && std::ranges::count(names, name) > 1) {
         throw Error("one buffer is given for two arrays of light; give each its own");
       }
     }

@@ -15,9 +15,12 @@
  *   rebounce_engine_relight(engine, &lamp, 1, NULL);
  *   const float* indirect = rebounce_engine_indirect_irradiance(engine);   // [n][3], lx
  *
- * Functions that can fail return a status; no exception leaves the library. Handles may be given
- * NULL where that is said, and arrays are borrowed for the time of a call. Units are photometric
- * (cd, lx, cd/m²), lengths metres, space glTF's, colours linear Rec.709.
+ * Functions that can fail return a status; no exception leaves the library. Files that cannot be
+ * used give REBOUNCE_BAD_INPUT, all else that does not fit REBOUNCE_INVALID_ARGUMENT: NULL, a wrong
+ * size, a number out of range, an output that the file was made without. Handles may be given NULL
+ * where that is said; functions without a status do nothing if an argument is NULL. Arrays are
+ * borrowed for the time of a call. Units are photometric (cd, lx, cd/m²), lengths metres, space
+ * glTF's, colours linear Rec.709.
  *
  * Threads: a transfer is immutable and may be used by any number of threads; an engine belongs to
  * one thread at a time, and a frame that begins within another's fails. A frame neither allocates
@@ -43,7 +46,7 @@ extern "C" {
 
 typedef enum rebounce_status {
   REBOUNCE_OK = 0,
-  REBOUNCE_INVALID_ARGUMENT = 1, /* NULL, a wrong size, a light out of its range */
+  REBOUNCE_INVALID_ARGUMENT = 1, /* NULL, a wrong size, a number out of range */
   REBOUNCE_BAD_INPUT = 2,        /* a file that cannot be opened, is damaged or is none of ours */
   REBOUNCE_OUT_OF_MEMORY = 3,
   REBOUNCE_UNSUPPORTED = 4, /* the library was built without what this needs */
@@ -64,7 +67,8 @@ const char* rebounce_last_error(void);
 
 typedef struct rebounce_transfer rebounce_transfer;
 
-/* Loads a transfer file (UTF-8 path), checks all of it, and writes a handle with one reference. */
+/* Loads a transfer file (UTF-8 path), checks all of it, and writes a handle with one reference. The
+ * file is mapped: it must not change while the transfer is in use. */
 rebounce_status rebounce_transfer_load(const char* path, rebounce_transfer** transfer);
 
 /* Reads one from memory, of which it keeps a copy; `name` (UTF-8) stands for it in messages. */
@@ -84,7 +88,7 @@ typedef struct rebounce_transfer_info {
   uint32_t material_count;
   uint32_t probe_count;    /* 0: there are none */
   uint32_t probe_grid[3];  /* probes along x, y, z, x fastest; zeros: no grid */
-  uint64_t operator_bytes; /* that a frame reads, all channels */
+  uint64_t operator_bytes; /* that are stored, all channels */
   uint32_t lightmap_width; /* texels; 0: there is no lightmap */
   uint32_t lightmap_height;
   uint32_t camera_count;
@@ -92,7 +96,7 @@ typedef struct rebounce_transfer_info {
                         in the area-weighted L2 norm, the mean over these */
   float error_max;   /* the largest of these */
   float error_bound; /* one in 80 of further lights of a kind may err more, no more of them,
-                        with a confidence of 95 % */
+                        with a confidence of 95 %; one in five where nothing is compressed */
 } rebounce_transfer_info;
 
 /* Writes the size, and zeros. */
@@ -206,7 +210,7 @@ typedef struct rebounce_light {
   float color[3];         /* >= 0; default 1 */
   float intensity;        /* >= 0; cd (point, spot), lx (directional), cd/m² (others); default 1 */
   float range;            /* m; no light arrives from further away; 0, the default: unlimited */
-  float inner_cone_angle; /* rad from the axis, spot; default 0 */
+  float inner_cone_angle; /* rad from the axis, spot, at most the outer one; default 0 */
   float outer_cone_angle; /* rad from the axis, spot, at most pi/2; default pi/4 */
   float radius;           /* m, > 0, sphere and disc */
   float size[2];          /* m, > 0, rectangle: along the tangent and across it */
@@ -222,8 +226,8 @@ void rebounce_light_init(rebounce_light* light);
 /* The luminance in cd/m² in every direction in which the scene is open; times the distribution of
  * the engine's sky, where it has one. */
 typedef struct rebounce_sky {
-  float color[3];
-  float luminance;
+  float color[3];  /* >= 0 */
+  float luminance; /* >= 0 */
 } rebounce_sky;
 
 /* Cells of the sky: 0 is all that is below the horizon, 1 to 145 are Tregenza's, in rows of 12
@@ -233,7 +237,8 @@ typedef struct rebounce_sky {
 
 /* Writes the relative luminance [REBOUNCE_SKY_CELL_COUNT] of a sky of the CIE standard general sky,
  * `type` 1 (overcast) to 15, 12 being clear: 1 at the zenith. `sun_direction` [3] is the way that
- * sunlight travels, downwards; the ground reflects `ground_reflectance`, 0 to 1. */
+ * sunlight travels, of any length but 0, downwards where the type is brighter around the sun; the
+ * ground reflects `ground_reflectance`, 0 to 1. */
 rebounce_status rebounce_cie_sky(int type, const float* sun_direction, float ground_reflectance,
                                  float* distribution);
 
@@ -252,8 +257,8 @@ typedef void (*rebounce_parallel_for)(void* user, uint32_t count, rebounce_task 
 
 typedef struct rebounce_engine_settings {
   uint32_t struct_size;        /* sizeof(rebounce_engine_settings) */
-  uint32_t points_per_patch;   /* at which lamps are looked at; default 8; more: truer shadows */
-  uint32_t area_light_samples; /* of lamps with a surface, for each point; default 4, most 64 */
+  uint32_t points_per_patch;   /* that look at lamps, >= 1; default 8; more: truer shadows */
+  uint32_t area_light_samples; /* of lamps with a surface, for each point, 1 to 64; default 4 */
   uint32_t light_capacity; /* lights for which there is room at once; default 16. The first frame
                               with more makes the room it lacks, the only one that allocates */
   rebounce_parallel_for parallel_for; /* shares out the loops of the frames and outputs of the
@@ -303,9 +308,9 @@ const float* rebounce_engine_direct_irradiance(const rebounce_engine* engine);
 const float* rebounce_engine_indirect_irradiance(const rebounce_engine* engine);
 const float* rebounce_engine_radiosity(const rebounce_engine* engine);
 
-/* Indirect irradiance of the last frame at the vertices of the display mesh [vertex_count][3], at
- * least 0, with the rows of vertices that the file has; and direct irradiance likewise, as smooth
- * as patches are large. */
+/* Indirect irradiance in lx of the last frame at the vertices of the display mesh
+ * [vertex_count][3], at least 0, with the rows of vertices that the file has; and direct irradiance
+ * likewise, as smooth as patches are large. */
 rebounce_status rebounce_engine_vertex_irradiance(const rebounce_engine* engine, float* irradiance,
                                                   size_t vertex_count);
 rebounce_status rebounce_engine_vertex_direct_irradiance(const rebounce_engine* engine,
@@ -323,13 +328,14 @@ void rebounce_bent_irradiance(const float* harmonics, const float* irradiance, c
                               const float* bent, float* result);
 
 /* Indirect irradiance of the last frame at the texels of the lightmap, [height][width][3] in lx,
- * rows from the top; 0 in texels that show nothing. `texel_count` is width x height. */
+ * rows from the top; 0 in texels that show nothing. `texel_count` is width x height. Needs a file
+ * made with --lightmap. */
 rebounce_status rebounce_engine_lightmap_irradiance(rebounce_engine* engine, float* irradiance,
                                                     size_t texel_count);
 
 /* Radiance in cd/m² that arrives at the light probes from patches and sky in the last frame, lamps
  * apart: [probe_count][9][3], coefficients of real spherical harmonics of degree 0 to 2
- * (Ramamoorthi and Hanrahan 2001). */
+ * (Ramamoorthi and Hanrahan 2001). Needs a file made with --probes. */
 rebounce_status rebounce_engine_probe_light(const rebounce_engine* engine, float* harmonics,
                                             size_t probe_count);
 
@@ -444,14 +450,14 @@ typedef struct rebounce_gpu_lamp {
                            either may be infinite, and the first may be the larger */
 } rebounce_gpu_lamp;
 
-/* Writes the size, and the defaults: no shadow map. */
+/* Writes the size, and the defaults: no shadow map, a depth range of 0.05 to 100. */
 void rebounce_gpu_lamp_init(rebounce_gpu_lamp* lamp);
 
 /* Writes the direct irradiance [patch_count][3] in lx to the buffer of this name: what the buffer
  * `others` has (0: nothing), lamps with a surface and skies for instance, and the light of `lamps`
- * at rebounce_transfer_receiver_points. The shadow maps are complete; shaders that write the others
- * and read the result need no barrier. What does not fit is refused, with the lamp's number;
- * nothing is done then. */
+ * at the rebounce_transfer_receiver_points, 8 on each patch. The shadow maps are complete; shaders
+ * that write the others and read the result need no barrier. What does not fit is refused, with the
+ * lamp's number; nothing is done then. */
 rebounce_status rebounce_gpu_engine_light_patches(rebounce_gpu_engine* engine,
                                                   const rebounce_gpu_lamp* lamps, size_t lamp_count,
                                                   uint32_t direct_irradiance, uint32_t others);
@@ -464,7 +470,7 @@ typedef struct rebounce_gpu_buffers {
   uint32_t indirect_irradiance; /* [patch_count] out; 0: not wanted */
   uint32_t radiosity;           /* [patch_count] out; 0: not wanted */
   uint32_t vertex_irradiance;   /* [vertex_count] out, indirect, at least 0; 0: not wanted */
-  uint32_t lightmap_irradiance; /* [height][width] out, likewise */
+  uint32_t lightmap_irradiance; /* [height][width] out, likewise; of a file with a lightmap */
   uint32_t probe_light;         /* [probe_count][9] out, cd/m², as rebounce_engine_probe_light
                                    writes it; 0: not wanted */
 } rebounce_gpu_buffers;

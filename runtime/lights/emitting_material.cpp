@@ -17,15 +17,19 @@ float area_of(const DisplayMesh& mesh, std::size_t t) {
 std::vector<std::uint32_t> find_emitting_material(const TransferData& data) {
   const DisplayMesh& mesh = data.mesh;
   std::vector<std::uint32_t> material(data.patches.size(), kNone);
-  std::vector<float> largest(data.patches.size(), 0.0F);
-  for (std::size_t t = 0; t < mesh.triangle.size(); ++t) {
-    const std::uint32_t patch = mesh.triangle_patch[t], m = mesh.triangle_material[t];
-    if (patch == kNone || m >= data.materials.size()) continue;
+  std::vector<float> most(material.size(), 0.0F), covered(material.size());
+  for (std::uint32_t m = 0; m < data.materials.size(); ++m) {
     if (data.materials[m].emitted_luminance == Float3{0, 0, 0}) continue;
-    const float area = area_of(mesh, t);
-    if (area <= largest[patch]) continue;
-    largest[patch] = area;
-    material[patch] = m;
+    covered.assign(covered.size(), 0.0F);
+    for (std::size_t t = 0; t < mesh.triangle.size(); ++t) {
+      const std::uint32_t patch = mesh.triangle_patch[t];
+      if (patch != kNone && mesh.triangle_material[t] == m) covered[patch] += area_of(mesh, t);
+    }
+    for (std::size_t i = 0; i < covered.size(); ++i) {
+      if (covered[i] <= most[i]) continue;
+      most[i] = covered[i];
+      material[i] = m;
+    }
   }
   return material;
 }

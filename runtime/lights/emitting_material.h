@@ -7,8 +7,7 @@
 
 namespace rebounce {
 
-/// The emitting material of each patch [n]: that of its largest triangle with an emitting material,
-/// or kNone.
+/// The emitting material of each patch [n], the one that covers most of it, or kNone.
 std::vector<std::uint32_t> find_emitting_material(const TransferData& data);
 
 }  // namespace rebounce

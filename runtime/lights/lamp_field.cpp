@@ -52,6 +52,11 @@ void check_field(const Light& light, const LampField& field) {
               "inner cone angle", "from 0 to the outer one");
       break;
     case FieldRule::kProfile:
+      if (const IntensityProfile* const profile = light.profile.get()) {
+        const std::size_t angles = profile->vertical.size() * profile->horizontal.size();
+        require(angles > 0 && profile->candela.size() == angles, field.name,
+                "a table with a candela for each pair of angles");
+      }
       break;
   }
 }

@@ -11,6 +11,10 @@ namespace {
 constexpr std::size_t kLanes = OccluderGroup::kLanes, kCorners = OccluderGroup::kCorners;
 constexpr float kNever = std::numeric_limits<float>::max();  // distance of a plane without
                                                              // an inner side
+
+// The cosine to a plane's normal up to which a lamp without a place lies in the plane: more than
+// rounding of unit vectors makes.
+constexpr float kLeastCosine = 1e-6F;
 using Vectors = OccluderGroup::Vectors;
 
 void put(Vectors& vectors, std::size_t lane, const glm::vec3& v) {
@@ -60,7 +64,7 @@ struct ShadowVolumes::Lamp {
   Lamp(const PreparedLight& lamp, float of_planes)
       : at(lamp.kind->has_place() ? lamp.position : -lamp.direction),
         has_place(lamp.kind->has_place() ? 1.0F : 0.0F),
-        tolerance(of_planes) {
+        tolerance(lamp.kind->has_place() ? of_planes : kLeastCosine) {
     if (!lamp.has_area()) return;
     side = lamp.side;
     other_side = lamp.other_side;

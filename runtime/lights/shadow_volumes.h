@@ -58,7 +58,8 @@ class ShadowVolumes {
         inner_planes_(outer_planes_.size()) {}
 
   /// Computes the volumes of `lamp`. Does not allocate. `groups`: as many as the object has;
-  /// `tolerance`, metres: what a lamp may reach behind a plane and count as in front of it.
+  /// `tolerance`, metres: what a lamp with a place may reach behind a plane and count as in front
+  /// of it.
   void set(const PreparedLight& lamp, std::span<const OccluderGroup> groups, float tolerance);
 
   /// What stands between the lamp and a box.

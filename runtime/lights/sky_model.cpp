@@ -45,7 +45,8 @@ const SkyType& type_of(int number) {
 
 CieSky::CieSky(int type, const glm::dvec3& sun_direction)
     : type_(type_of(type)), to_sun_(-sun_direction) {
-  if (!(glm::length(to_sun_) > 0) || (type_.c > 0 && !(to_sun_.y >= 0))) {
+  const double length = glm::length(to_sun_);
+  if (!(length > 0 && std::isfinite(length)) || (type_.c > 0 && !(to_sun_.y >= 0))) {
     throw Error("the sun of a CIE sky must stand above the horizon: its light travels downwards");
   }
   to_sun_ = glm::normalize(to_sun_);

@@ -11,6 +11,13 @@
 
 namespace rebounce {
 
+/// Throws Error if there are no probes.
+inline void check_probes(const LightProbes& probes) {
+  if (probes.size() == 0) {
+    throw Error("the transfer file has no light probes; make it with --probes");
+  }
+}
+
 /// Throws Error if an argument of a function on probes has the wrong size.
 inline void check_probe_size(std::size_t size, std::size_t wanted, const char* name) {
   if (size == wanted) return;
@@ -27,7 +34,8 @@ struct GridPlace {
 inline GridPlace place_in_row(float x, float first, float last, std::uint32_t count) {
   if (count < 2 || !(last > first)) return {};
   const auto end = static_cast<float>(count - 1);
-  const float at = std::clamp((x - first) / (last - first) * end, 0.0F, end);
+  const float along = (x - first) / (last - first) * end;
+  const float at = along > 0 ? std::min(along, end) : 0;  // 0 for what is no number too
   const auto low = std::min(static_cast<std::uint32_t>(at), count - 2);
   return {low, low + 1, at - static_cast<float>(low)};
 }

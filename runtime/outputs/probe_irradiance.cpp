@@ -57,7 +57,7 @@ class IrradianceSum {
     for (std::size_t k = 0; k < normals_.size(); ++k) {
       irradiance[k] = irradiance_of(wide, normals_[k]);
       for (std::size_t c = 0; c < kChannelCount; ++c) {
-        irradiance[k][c] = (irradiance[k][c] + spots_[c][k]) / divisor;
+        irradiance[k][c] = std::max(0.0F, (irradiance[k][c] + spots_[c][k]) / divisor);
       }
     }
   }
@@ -118,8 +118,9 @@ void for_each_block(std::span<const Float3> normals, const Visit& visit) {
 void irradiance_at_probes(const LightProbes& probes, std::span<const Float3> radiosity,
                           const Sky& sky, std::span<const Float3> normals,
                           std::span<Float3> irradiance, const Scheduler& scheduler) {
+  if (probes.size() == 0 && irradiance.empty()) return;
+  check_probes(probes);
   check_probe_size(irradiance.size(), probes.size() * normals.size(), "the irradiance");
-  if (probes.size() == 0) return;
   check_probe_size(radiosity.size(), probes.patch_count, "the radiosity");
   const SeenSky seen_sky(probes.sky, probes.sky_cells, sky);
   for_each_block(normals, [&](const NormalBlock& block, std::size_t first) {
@@ -134,6 +135,7 @@ void irradiance_at_probes(const LightProbes& probes, std::span<const Float3> rad
 void irradiance_in_air(const LightProbes& probes, std::span<const Float3> radiosity, const Sky& sky,
                        const Float3& position, std::span<const Float3> normals,
                        std::span<Float3> irradiance) {
+  check_probes(probes);
   check_probe_size(irradiance.size(), normals.size(), "the irradiance");
   check_probe_size(radiosity.size(), probes.patch_count, "the radiosity");
   const SeenSky seen_sky(probes.sky, probes.sky_cells, sky);

@@ -50,8 +50,9 @@ ProbeLight light_of_probe(const LightProbes& probes, std::size_t p,
 template <typename Light, typename LightOf>
 void apply(const LightProbes& probes, std::span<const Float3> radiosity, const Sky& sky,
            const LightOf& light_of, std::span<Light> light, const Scheduler& scheduler) {
+  if (probes.size() == 0 && light.empty()) return;
+  check_probes(probes);
   check_probe_size(light.size(), probes.size(), "the result");
-  if (probes.size() == 0) return;
   check_probe_size(radiosity.size(), probes.patch_count, "the radiosity");
   const SeenSky seen_sky(probes.sky, probes.sky_cells, sky);
   parallel_for_pieces(scheduler, probes.size(), kProbesPerTask,
@@ -91,6 +92,7 @@ ProbeLight interpolate_probes(const LightProbes& probes, std::span<const ProbeLi
 
 ProbeLight gather_probe_light(const LightProbes& probes, std::span<const Float3> radiosity,
                               const Sky& sky, const Float3& position) {
+  check_probes(probes);
   check_probe_size(radiosity.size(), probes.patch_count, "the radiosity");
   const SeenSky seen_sky(probes.sky, probes.sky_cells, sky);
   ProbeLight sum{};

@@ -17,8 +17,8 @@ void check_operator(const TransferOperator* transfer) {
   if (transfer == nullptr) throw Error("error estimate: the transfer data have no operator");
   if (!transfer->roles().all_are_both()) {
     throw Error(
-        "error estimate: the operator has receivers or sources, and an error is known of one that "
-        "serves all patches alone");
+        "error estimate: the operator has receivers or sources, and errors can be estimated only "
+        "without; precompute without --receivers and --sources");
   }
 }
 

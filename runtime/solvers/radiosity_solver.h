@@ -44,7 +44,7 @@ class RadiositySolver {
   void set_reflectance(std::span<const Float3> reflectance);
 
   /// The next solve starts from `radiosity` [n] in lx. Throws Error if the size is wrong or a
-  /// number is negative or not finite.
+  /// number is not finite.
   void start_from(std::span<const Float3> radiosity);
 
   /// The next solve starts without a solution.

@@ -24,6 +24,35 @@ const SweepableFormFactors& sweepable(const FormFactorOperator& form_factors) {
   return *form;
 }
 
+/// Gathers -Y x. With -Y in the place of F the system is (I + rho Y) B = M0, and since
+/// I + rho Y = (I - rho F)^-1, its solution is M0 - rho F M0.
+class NegatedTransfer final : public FormFactorOperator {
+ public:
+  explicit NegatedTransfer(const TransferOperator& transfer) : transfer_(transfer) {}
+
+  std::size_t patch_count() const override { return transfer_.patch_count(); }
+  std::size_t bytes() const override { return transfer_.bytes(); }
+  std::size_t workspace_size() const override { return transfer_.workspace_size(); }
+
+ private:
+  void do_gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
+                 const Scheduler& scheduler) const override {
+    transfer_.apply(in, out, workspace, scheduler);
+    for (Float3& value : out) value = {-value[0], -value[1], -value[2]};
+  }
+
+  const TransferOperator& transfer_;
+};
+
+/// F M by the operator alone, to its error: Y (M - rho F M) = F M.
+std::vector<Float3> gather_by_operator(const TransferOperator& transfer, const PatchTable& patches,
+                                       std::span<const Float3> exitance) {
+  std::vector<Float3> rest(exitance.size());
+  solve_radiosity(SolveMethod::kConjugateGradient, NegatedTransfer(transfer),
+                  {patches.area, patches.reflectance}, exitance, {.residual = 1e-4}, rest);
+  return product(transfer, rest);
+}
+
 }  // namespace
 
 std::unique_ptr<const SweepableFormFactors> make_form_factors(SolveMethod method,
@@ -54,6 +83,9 @@ std::vector<Float3> irradiance_from_emitters(const TransferData& data) {
   if (!data.emitted_irradiance.empty()) return data.emitted_irradiance;
   const std::vector<Float3>& emitted = data.patches.emitted_exitance;
   if (std::ranges::all_of(emitted, [](const Float3& m) { return m == Float3{}; })) return {};
+  if (!has_form_factors(data) && data.transfer && data.transfer->roles().all_are_both()) {
+    return gather_by_operator(*data.transfer, data.patches, emitted);
+  }
   return gather(*make_form_factors(SolveMethod::kGathering, data), emitted);
 }
 

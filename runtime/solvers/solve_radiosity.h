@@ -35,8 +35,9 @@ bool has_form_factors(const TransferData& data);
 std::unique_ptr<const SweepableFormFactors> make_form_factors(SolveMethod method,
                                                               const TransferData& data);
 
-/// F M_e [n] in lx: the irradiance directly from the scene's own emitters, as `data` hold it or as
-/// their F gives it. Empty if nothing emits. Throws Error if something does and there is neither.
+/// F M_e [n] in lx: the irradiance directly from the scene's own emitters, as `data` hold it, as
+/// their F gives it, or, to its error, their operator. Empty if nothing emits. Throws Error if
+/// something does and there is neither, nor an operator that serves all patches.
 std::vector<Float3> irradiance_from_emitters(const TransferData& data);
 
 /// Makes a solver for `method`. `form_factors` must outlive it. `transfer` may be null for methods

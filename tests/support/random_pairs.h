@@ -39,7 +39,8 @@ struct Pairs {
   }
 };
 
-inline void expect_near(const Float3& a, const Float3& b, double tolerance) {
+/// Fails the test where a component is off by more than a part of it, or of 1 where it is less.
+inline void expect_near_relative(const Float3& a, const Float3& b, double tolerance) {
   for (int c = 0; c < kChannelCount; ++c) EXPECT_NEAR(a[c], b[c], tolerance * (1 + std::abs(b[c])));
 }
 

@@ -17,7 +17,12 @@ OperatorKind operator_kind(std::string_view name) {
   const std::span kinds(kOperatorKinds);
   const auto named = std::ranges::find(kinds, name, &NamedOperatorKind::name);
   if (named == kinds.end()) {
-    throw Error("there is no operator of the kind \"" + std::string(name) + "\"");
+    std::string names;
+    for (const NamedOperatorKind& known : kinds) {
+      names += (names.empty() ? "" : ", ") + std::string(known.name);
+    }
+    throw Error("the kind of an operator must be one of " + names + ", not \"" + std::string(name) +
+                "\"");
   }
   return named->kind;
 }

@@ -384,8 +384,10 @@ class Checker {
     for (std::size_t i = 0; i < values.size(); ++i) {
       if (values[i] == allowed) continue;
       index(name, i, values[i], count);
-      if (there[values[i]])
-        refuse_entry(name, i, std::to_string(values[i]), "there for the first time");
+      if (there[values[i]]) {
+        refuse(name, "entry " + std::to_string(i) + " is " + std::to_string(values[i]) +
+                         ", which an earlier entry is too");
+      }
       there[values[i]] = true;
     }
   }

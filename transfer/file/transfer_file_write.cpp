@@ -128,6 +128,8 @@ void collect_operator(const TransferOperator* transfer, TensorCollector& collect
     collect_dense_operator(dense->storage(), collector);
   } else if (const auto* blocks = dynamic_cast<const HierarchicalOperator*>(transfer)) {
     collect_hierarchical_operator(blocks->storage(), kHierarchicalTransfer, collector);
+  } else if (transfer == nullptr) {
+    throw Error("the data have no operator, and a transfer file needs one; build them with one");
   } else {
     throw Error(
         "a transfer file cannot hold this kind of operator; give it one that the library has");

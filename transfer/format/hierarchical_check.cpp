@@ -119,6 +119,9 @@ std::size_t checked_cluster_coefficient_count(const Storage& storage, std::size_
       refuse("cluster coefficients are not numbered in the order of their blocks");
     end += block.column_count;
   }
+  if ((end - position_count) % HierarchicalFormat::kAlignment != 0) {
+    refuse("the number of cluster coefficients is no multiple of 16");
+  }
   if (storage.coefficient_scale.size() != end - position_count)
     refuse("there is not one scale for each cluster coefficient");
   if (!std::ranges::all_of(storage.coefficient_scale, [](float s) { return std::isfinite(s); })) {

@@ -73,8 +73,9 @@ WantedRuns with_cluster_coefficients(const HierarchicalStorage& storage,
   const WantedRuns wanted(positions, position_count);
   for (const TransferBlock& block : storage.blocks) {
     if (!is_cluster_basis(block) || !wanted.any(block.row_begin, block.row_count)) continue;
-    for (std::uint32_t m = 0; m < block.column_count; m += kAlignment) {
-      positions.push_back(block.column_begin + m);
+    const std::uint32_t end = block.column_begin + block.column_count;
+    for (std::uint32_t run = block.column_begin / kAlignment; run * kAlignment < end; ++run) {
+      positions.push_back(run * kAlignment);
     }
   }
   return {positions, position_count + cluster_coefficient_count};

@@ -10,6 +10,7 @@
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <optional>
 #include <string>
 
@@ -182,8 +183,10 @@ class GlbBuilder {
     entry["type"] = lamp_kind(light.type).name;
     if (light.range > 0 && light.type != LightType::kDirectional) entry["range"] = light.range;
     if (light.type == LightType::kSpot) {
-      entry["spot"] = {{"innerConeAngle", light.inner_cone_angle},
-                       {"outerConeAngle", light.outer_cone_angle}};
+      // glTF wants at most pi / 2, which single precision rounds up, and less for the inner one.
+      const double outer = std::min<double>(light.outer_cone_angle, std::numbers::pi / 2);
+      const double inner = std::min<double>(light.inner_cone_angle, 0.999999 * outer);
+      entry["spot"] = {{"innerConeAngle", inner}, {"outerConeAngle", outer}};
     }
     return entry;
   }
@@ -258,7 +261,7 @@ class GlbBuilder {
                                                    : texture_index(material.base_color_texture)}};
     }
     json entry = {{"extensions", {{"KHR_materials_unlit", json::object()}}}};
-    const float alpha = material.base_alpha * (1 - material.transmission);
+    const float alpha = material.base_alpha * (1 - material.transmitted());
     if (material.alpha_mode == AlphaMode::kMask) {
       entry["alphaMode"] = "MASK";
       entry["alphaCutoff"] = material.alpha_cutoff;

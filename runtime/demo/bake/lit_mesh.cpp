@@ -8,6 +8,7 @@
 #include "runtime/demo/bake/lit_surface.h"
 #include "runtime/demo/bake/lit_texture.h"
 #include "runtime/demo/bake/subdivided_mesh.h"
+#include "runtime/demo/image/exposure.h"
 #include "runtime/demo/image/tone_curve.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/sample_sequence.h"
@@ -128,7 +129,7 @@ std::vector<std::uint8_t> triangles_with_texels(const TransferData& data) {
   chosen.resize(data.mesh.triangle.size(), 0);
   for (std::size_t t = 0; t < chosen.size(); ++t) {
     const Material& material = data.materials[data.mesh.triangle_material[t]];
-    if (material.alpha_mode != AlphaMode::kOpaque || material.transmission > 0) chosen[t] = 0;
+    if (material.alpha_mode != AlphaMode::kOpaque || material.transmitted() > 0) chosen[t] = 0;
   }
   return chosen;
 }
@@ -203,6 +204,7 @@ void light_vertices(const VertexLighter& lighter, LitMesh& lit) {
 LitMesh light_mesh(const TransferData& data, const RayTracer& tracer, const PictureLight& light,
                    const Camera& camera, const LitMeshSettings& settings) {
   if (settings.samples_per_vertex < 1) throw Error("a lit mesh needs at least one sample a vertex");
+  if (settings.exposure) check_exposure(*settings.exposure);
   const std::vector<std::uint8_t> in_texture = triangles_with_texels(data);
   const auto count_in_texture =
       static_cast<std::size_t>(std::ranges::count(in_texture, std::uint8_t{1}));

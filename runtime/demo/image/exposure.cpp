@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rebounce/error.h"
+
 namespace rebounce {
 namespace {
 
@@ -15,6 +17,11 @@ constexpr double kBlackShare =
     1e-3;  // relative to the mean: darker pixels do not raise the exposure
 
 }  // namespace
+
+void check_exposure(float stops) {
+  constexpr float kMostStops = 64;
+  if (!(std::abs(stops) <= kMostStops)) throw Error("an exposure must be from -64 to 64 stops");
+}
 
 float automatic_exposure(std::vector<float> luminance) {
   std::erase_if(luminance, [](float y) { return !(y >= 0) || std::isinf(y); });

@@ -9,4 +9,7 @@ namespace rebounce {
 /// white. 0 if all are black.
 float automatic_exposure(std::vector<float> luminance);
 
+/// Throws Error unless an exposure is from -64 to 64 stops, where light keeps its range.
+void check_exposure(float stops);
+
 }  // namespace rebounce

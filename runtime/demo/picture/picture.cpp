@@ -344,6 +344,7 @@ PictureRenderer& PictureRenderer::operator=(PictureRenderer&&) noexcept = defaul
 
 Picture PictureRenderer::render(const PictureLight& light, const PictureSettings& settings) const {
   check(settings);
+  if (settings.exposure) check_exposure(*settings.exposure);
   const auto& [data, tracer, surface] = *impl_;
   Picture picture{.width = settings.width, .height = settings.height};
   if (!is_light(settings.show)) {

@@ -100,8 +100,7 @@ float DisplaySurface::opacity(const Hit& hit) const {
     }
     if (material.alpha_mode == AlphaMode::kMask) alpha = alpha >= material.alpha_cutoff ? 1 : 0;
   }
-  const bool emits = material.emitted_luminance != Float3{0, 0, 0};
-  return emits ? alpha : alpha * (1 - material.transmission);
+  return alpha * (1 - material.transmitted());
 }
 
 glm::vec3 DisplaySurface::albedo(const SurfacePoint& point, float width) const {

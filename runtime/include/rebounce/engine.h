@@ -197,7 +197,8 @@ class GpuEngine {
   void set_emitted_exitance(std::span<const Float3> emitted_exitance);
 
   /// From the next frame on, the sky that probes see, found on the processor; at first it is dark.
-  /// Throws Error as check_sky does.
+  /// Throws Error if a number of it is negative or not finite, or it has a distribution and the
+  /// file has no sky cells.
   void set_sky(const Sky& sky);
 
   /// Writes the direct irradiance [n] in lx to the buffer of this name: what the buffer `others`

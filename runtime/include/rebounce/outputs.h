@@ -68,7 +68,8 @@ void probe_irradiance(const Engine& engine, std::span<const Float3> normals,
 
 /// The light at a point in the air, interpolated between the valid ones of the eight probes around
 /// it; outside of their grid, the light at its border. Zero where none of the eight is valid, or if
-/// the probes are no grid. It takes the time of the probes around the point.
+/// the probes are no grid. It takes the time of the probes around the point. Needs a file made with
+/// --probes.
 ProbeLight light_in_air(const Engine& engine, const Float3& position);
 
 /// The irradiance there on surfaces of each of the unit `normals`: irradiance [K] in lx.
@@ -76,7 +77,7 @@ void irradiance_in_air(const Engine& engine, const Float3& position,
                        std::span<const Float3> normals, std::span<Float3> irradiance);
 
 /// The same as light_in_air, from the light [p] that probe_light wrote: faster for many points of a
-/// frame.
+/// frame. Zero if `light` has another size.
 ProbeLight interpolate_probes(const LightProbes& probes, std::span<const ProbeLight> light,
                               const Float3& position);
 

@@ -26,11 +26,10 @@ struct Sky {
 /// The cell that the unit vector `direction` points to.
 std::uint32_t sky_cell(const Float3& direction);
 
-/// A point of `cell`, which is not 0, uniform by solid angle over [0, 1)² of `place`: a unit
-/// vector.
+/// A point of `cell`, from 1 to 145, uniform by solid angle over [0, 1)² of `place`: a unit vector.
 Float3 point_of_sky_cell(std::uint32_t cell, const Float2& place);
 
-/// The solid angle of a cell, sr.
+/// The solid angle of a cell, from 0 to 145, sr.
 float sky_cell_solid_angle(std::uint32_t cell);
 
 inline constexpr int kCieSkyCount = 15;

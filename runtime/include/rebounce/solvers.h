@@ -19,9 +19,9 @@ namespace rebounce {
 
 enum class SolveMethod : std::uint8_t {
   kGathering,
-  kJacobi,                ///< the same iteration as kGathering (gathering_solver.h)
-  kGaussSeidel,           ///< needs SweepableFormFactors
-  kSymmetricGaussSeidel,  ///< needs SweepableFormFactors
+  kJacobi,                ///< the same iteration as kGathering
+  kGaussSeidel,           ///< of pairs or compressed form factors, not of links
+  kSymmetricGaussSeidel,  ///< likewise
   kConjugateGradient,
   kRefine,  ///< needs a stored operator that serves all patches
 };
@@ -102,7 +102,7 @@ class Solver {
   void set_reflectance(std::span<const Float3> reflectance);
 
   /// The next solve starts from `radiosity` [n] in lx. Throws Error if the size is wrong or a
-  /// number is negative or not finite.
+  /// number is not finite.
   void start_from(std::span<const Float3> radiosity);
 
   /// The next solve starts from nothing.

@@ -356,7 +356,7 @@ TEST_F(GpuEngineTest, RefusesLampsItCannotLight) {
   test::expect_error([&] { gpu.light_patches({}, direct.name(), direct.name()); },
                      "given for two arrays");
   test::expect_error([&] { GpuEngine(data, eglGetProcAddress, {.points_per_patch = 0}); },
-                     "at least one point");
+                     "points_per_patch is 0");
 }
 
 TEST_F(GpuEngineTest, LeavesTheTexturesOfTheContext) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 
 #include "tests/runtime/rays/occluder_samples.h"
@@ -102,6 +103,20 @@ TEST(ShadowVolumes, ALampThatTouchesASurfaceShinesPastIt) {
   ShadowVolumes volumes(1);
   volumes.set(PreparedLight(panel), OccluderGroups(Occluders{.piece = {ceiling}}).group, 1e-5F);
   EXPECT_LT(depth(volumes.outer()[0], {0.3F, 0, 0.2F}), 0);
+}
+
+TEST(ShadowVolumes, ALowSunIsKeptOffInAVastScene) {
+  const Occluder roof{.corner = {glm::vec3(-1, 1, 1), {1, 1, 1}, {1, 1, -1}, {-1, 1, -1}},
+                      .normal = {0, 1, 0},
+                      .solid = true};
+  Light sun;
+  sun.type = LightType::kDirectional;
+  sun.direction = {std::sqrt(0.99F), -0.1F, 0};
+  ShadowVolumes volumes(1);
+  const float of_vast_scene = 0.19F;  // metres: 2^-18 of 50 km
+  volumes.set(PreparedLight(sun), OccluderGroups(Occluders{.piece = {roof}}).group, of_vast_scene);
+  EXPECT_GT(depth(volumes.inner()[0], {0.5F, 0.95F, 0}), 0.01F);
+  EXPECT_LT(depth(volumes.outer()[0], {0.5F, 0.5F, 0}), 0);  // it comes in below the roof
 }
 
 TEST(ShadowVolumes, BoxesMeetWhatTheirPointsAreIn) {

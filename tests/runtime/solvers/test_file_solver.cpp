@@ -6,6 +6,7 @@
 
 #include "rebounce/error.h"
 #include "rebounce/solvers.h"
+#include "runtime/solvers/solve_radiosity.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/test_scene_data.h"
 
@@ -40,6 +41,16 @@ TEST(FileSolver, SaysWhatAFileHasNot) {
   data->exchange = {};
   test::expect_error([&] { make(FormFactorSource::kBest); }, "no form factors");
   EXPECT_THROW(Solver(nullptr, SolveMethod::kJacobi), Error);
+}
+
+TEST(FileSolver, WhatArrivesFromEmittersNeedsFormFactorsOrAnOperator) {
+  const auto data = test::facing_squares();
+  EXPECT_TRUE(irradiance_from_emitters(*data).empty());
+  data->patches.emitted_exitance[0] = {3, 2, 0};
+  EXPECT_EQ(irradiance_from_emitters(*data).size(), data->patches.size());
+  data->exchange = {};
+  data->transfer = nullptr;
+  test::expect_error([&] { irradiance_from_emitters(*data); }, "no form factors");
 }
 
 }  // namespace

@@ -68,12 +68,17 @@ TEST(IesProfile, WhatIsNoProfileIsRefused) {
 }
 
 TEST(IesProfile, AnyPrefixOfAFileIsRefusedOrRead) {
+  std::size_t refused = 0;
   for (std::size_t length = 0; length < kQuarters.size(); ++length) {
     try {
       parse_ies_profile(std::string_view(kQuarters).substr(0, length), "cut.ies");
-    } catch (const Error&) {  // one line that says so
+    } catch (const Error& error) {
+      ++refused;
+      EXPECT_NE(std::string(error.what()).find("cut.ies"), std::string::npos) << error.what();
+      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
     }
   }
+  EXPECT_GT(refused, kQuarters.size() / 2);
 }
 
 }  // namespace

@@ -14,7 +14,7 @@
 namespace rebounce::test_form_factor_blocks {
 namespace {
 
-using test::expect_near;
+using test::expect_near_relative;
 using test::Pairs;
 
 template <typename Blocks>
@@ -33,7 +33,7 @@ TYPED_TEST(EveryBlocks, GatherWhatTheRowsGather) {
                                   gather(FormFactorRows(pairs.exchange, pairs.area), pairs.light);
     // Halves add up in partial sums.
     const double allowed = std::is_same_v<TypeParam, FormFactorBlocks> ? 3e-7 : 1e-6;
-    for (std::size_t i = 0; i < n; ++i) expect_near(gathered[i], expected[i], allowed);
+    for (std::size_t i = 0; i < n; ++i) expect_near_relative(gathered[i], expected[i], allowed);
   }
 }
 
@@ -84,7 +84,7 @@ TYPED_TEST(EveryBlocks, SweepsAreThoseOfTheRowsInEveryOrderOfDirections) {
       const double changed = relax(rows, problem, direction, expected);
       EXPECT_NEAR(relaxation->sweep(direction), changed, 1e-4 * changed + 1e-6);
       relaxation->end(relaxed);
-      for (std::size_t i = 0; i < n; ++i) expect_near(relaxed[i], expected[i], 2e-6);
+      for (std::size_t i = 0; i < n; ++i) expect_near_relative(relaxed[i], expected[i], 2e-6);
     }
   }
 }

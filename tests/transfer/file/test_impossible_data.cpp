@@ -135,7 +135,7 @@ TEST(TransferFile, RefusesImpossibleRowsOfReceivers) {
   expect_refused({
       {"receiver.patch: 2 rows, not 3", rows([](auto& r) { r.patch.pop_back(); })},
       {"receiver.patch: entry 1 is 3, not below 3", rows([](auto& r) { r.patch[1] = 3; })},
-      {"receiver.patch: entry 1 is 2, not there for the first time",
+      {"receiver.patch: entry 1 is 2, which an earlier entry is too",
        rows([](auto& r) { r.patch[1] = 2; })},
       {"receiver.set: entry 1 is empty", rows([](auto& r) {
          r.set[1] = {2, 2};
@@ -149,7 +149,7 @@ TEST(TransferFile, RefusesImpossibleRowsOfReceivers) {
       {"receiver.scale: 3 rows, not 4", rows([](auto& r) { r.scale.pop_back(); })},
       {"receiver.vertex: 127 rows, not 128", rows([](auto& r) { r.receiver.pop_back(); })},
       {"receiver.vertex: entry 0 is 4, not below 4", rows([](auto& r) { r.receiver[0] = 4; })},
-      {"receiver.vertex: entry 127 is 3, not there for the first time",
+      {"receiver.vertex: entry 127 is 3, which an earlier entry is too",
        rows([](auto& r) { r.receiver[127] = 3; })},
       {"receiver.value", rows([](auto& r) { r.value.pop_back(); })},
       {"receiver.group_begin: does not begin", rows([](auto& r) { r.group_begin[0] = 4; })},

@@ -54,8 +54,8 @@ TEST(GatherKernels, InstructionSetsAgree) {
     SCOPED_TRACE(set->instruction_set);
     const Products products(row, set->gather);
     // Sums of 4,000 products in another order.
-    test::expect_near(products.gathered, expected.gathered, 1e-6);
-    test::expect_near(products.gathered_and_spread, expected.gathered_and_spread, 1e-5);
+    test::expect_near_relative(products.gathered, expected.gathered, 1e-6);
+    test::expect_near_relative(products.gathered_and_spread, expected.gathered_and_spread, 1e-5);
     EXPECT_EQ(products.spread, products.spread_beside);
     for (std::size_t k = 0; k < row.x.size(); ++k) {
       // One multiply-add with one rounding or with two.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/support/hierarchical_samples.h"
@@ -85,6 +86,56 @@ TEST(NestedOperator, ClusterBasesAreTheProductsThatTheyStandFor) {
       EXPECT_NEAR(y[(32 + i) * 64 + j], entry, 1e-4);
       EXPECT_NEAR(y[j * 64 + 32 + i], entry, 1e-4);
       EXPECT_EQ(y[i * 64 + j], 0);
+    }
+  }
+}
+
+TEST(NestedOperator, ReceiversHaveTheLightOfClusterBasesThatBeginWithinARun) {
+  // Three cells with 13, 12 and 7 cluster coefficients, and one block over all of them.
+  HierarchicalStorage storage;
+  storage.area.assign(64, 1.0F);
+  storage.patch.resize(64);
+  std::iota(storage.patch.begin(), storage.patch.end(), 0U);
+  storage.matrix_count = 1;
+  std::vector<float> values;
+  const auto take = [&](std::uint32_t count) {
+    for (std::uint32_t k = 0; k < count; ++k) {
+      values.push_back(std::sin(static_cast<float>(values.size())));
+    }
+  };
+  std::uint32_t begin = 0, coefficient = 64;
+  for (const auto& [size, rank] : {std::pair(16U, 13U), std::pair(16U, 12U), std::pair(32U, 7U)}) {
+    storage.blocks.push_back({.row_begin = begin,
+                              .row_count = size,
+                              .column_begin = coefficient,
+                              .column_count = rank,
+                              .kind = TransferBlock::Kind::kClusterBasis,
+                              .row_rank = rank});
+    take(rank * size);
+    begin += size;
+    coefficient += rank;
+  }
+  storage.coefficient_scale.assign(32, 1.0F);
+  storage.blocks.push_back({.row_begin = 64,
+                            .row_count = 32,
+                            .column_begin = 64,
+                            .column_count = 32,
+                            .kind = TransferBlock::Kind::kLowRank,
+                            .row_rank = 1,
+                            .column_rank = 1});
+  take(32 + 1);
+  values.resize(values.size() + HierarchicalFormat::kPadding);
+  storage.values_f32 = SharedArray(std::move(values));
+  const HierarchicalOperator op(storage);
+  const std::vector<Float3> m0 = test::random_light(64, 5, 100), whole = unaided_product(op, m0);
+  std::vector<std::uint32_t> patches(16);
+  std::iota(patches.begin(), patches.end(), 16U);
+  std::vector<Float3> some(64);
+  std::vector<float> workspace(op.workspace_size());
+  op.apply_to(op.receivers(patches), m0, some, workspace);
+  for (const std::uint32_t i : patches) {
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_NEAR(some[i][c], whole[i][c], 1e-4F * std::abs(whole[i][c]) + 1e-4F) << i;
     }
   }
 }

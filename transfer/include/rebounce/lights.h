@@ -51,8 +51,8 @@ struct Light {
   float intensity = 1;    ///< >= 0; candela (point, spot), lux (directional), candela per m²
                           ///< (sphere, rectangle, disc); with a profile a factor of its candelas
   float range = 0;        ///< metres; beyond it no light arrives; 0 means unlimited
-  float inner_cone_angle = 0;             ///< radians from the axis: full intensity inside (spot)
-  float outer_cone_angle = 0.785398163F;  ///< radians from the axis: none outside (spot)
+  float inner_cone_angle = 0;  ///< radians from the axis: full intensity inside (spot); >= 0
+  float outer_cone_angle = 0.785398163F;  ///< none outside; at least the inner one, at most pi/2
   float radius = 0;                       ///< metres, > 0 (sphere, disc)
   Float2 size{0, 0};                      ///< metres, > 0: along `tangent`, across it (rectangle)
   /// The way of the first side of a rectangle, and of horizontal angle 0 of a profile. It is made
@@ -60,5 +60,11 @@ struct Light {
   Float3 tangent{1, 0, 0};
   std::shared_ptr<const IntensityProfile> profile;  ///< of a luminaire (point, spot); may be null
 };
+
+/// Whether KHR_lights_punctual has such a lamp: a point, a spot or a directional light without a
+/// profile. Transfer files hold no others.
+inline bool is_punctual(const Light& light) {
+  return light.type <= LightType::kDirectional && !light.profile;
+}
 
 }  // namespace rebounce

@@ -52,6 +52,10 @@ struct Material {
   float alpha_cutoff = 0.5F;  ///< >= 0; used by kMask
   float base_alpha = 1;       ///< [0, 1]; multiplies the alpha of the base colour's texture
   float transmission = 0;     ///< [0, 1], KHR_materials_transmission: passes through unscattered
+
+  /// The part of light that is transmitted. A material that emits counts as if it transmitted
+  /// nothing: what a lamp's glass gives off is in its emission.
+  float transmitted() const { return emitted_luminance == Float3{0, 0, 0} ? transmission : 0; }
 };
 
 /// Per-patch quantities, each of n entries.
@@ -172,7 +176,7 @@ struct ReceiverRows {
   bool empty() const { return group_begin.empty(); }
   std::size_t group_count() const { return empty() ? 0 : group_begin.size() - 1; }
 
-  /// Entries by fours, within them receivers by fours, as integer bases are (operator_format.h).
+  /// Entries by fours, within them receivers by fours.
   static constexpr std::size_t value_index(std::size_t entry, std::size_t in_group) {
     return entry / 4 * 4 * kGroup + in_group / 4 * 16 + entry % 4 * 4 + in_group % 4;
   }
@@ -234,7 +238,7 @@ struct LightProbes {
 };
 
 /// Coefficients or values of the real spherical harmonics of degree 0 and 1, in the order (0,0),
-/// (1,-1), (1,0), (1,1), with the constants of spherical_harmonics.h.
+/// (1,-1), (1,0), (1,1), orthonormal over the sphere.
 inline constexpr std::size_t kLinearHarmonicCount = 4;
 using LinearHarmonics = std::array<float, kLinearHarmonicCount>;
 
@@ -275,11 +279,11 @@ struct BuildRecord {
   std::string generator;      ///< program and version
   std::string scene_name;     ///< file name of the source, without its folder
   std::string scene_hash;     ///< "xxh3:" + 32 hexadecimal digits over the source and its buffers
-  double solve_residual = 0;  ///< max relative residual of Y (I - rho F) = F over random probes
-  double tolerance = 0;       ///< asked for; 0 for a dense operator, which is exact to rounding
-  double error_mean = 0;      ///< relative area-weighted L2 error of H over test lights
-  double error_max = 0;
-  double error_bound = 0;  ///< see notes/reference/file_format.md
+  double solve_residual = 0;  ///< largest relative residual of Y (I - rho F) = F over random light
+  double tolerance = 0;       ///< asked for; 0 for operators that are not hierarchical
+  double error_mean = 0;      ///< relative area-weighted L2 error of H, mean over point lights
+  double error_max = 0;       ///< the largest of these
+  double error_bound = 0;     ///< see notes/reference/file_format.md
 };
 
 /// What a transfer file says of its scene: all that is in it but form factors and operator.

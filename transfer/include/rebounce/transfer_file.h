@@ -29,7 +29,8 @@ std::shared_ptr<const TransferData> read_transfer(std::vector<std::byte> bytes,
                                                   const std::string& name);
 
 /// Writes `data` whole or not at all: into a temporary file beside `path`, flushed to disk and then
-/// renamed over it. Throws Error if the folder is missing, not writable or full.
+/// renamed over it. Throws Error if there is no operator, or the folder is missing, not writable or
+/// full.
 void save_transfer(const std::filesystem::path& path, const TransferData& data);
 
 /// The scene of `data`; lives as long as they do.

@@ -76,8 +76,7 @@ constexpr AlphaTest kAllThere{1, -1}, kNotThere{0, 1};
 
 // Like DisplaySurface::opacity, but rounded to 0 or 1.
 AlphaTest alpha_test(const Material& material) {
-  const bool emits = material.emitted_luminance != Float3{0, 0, 0};
-  const float solid = emits ? 1 : 1 - material.transmission;
+  const float solid = 1 - material.transmitted();
   constexpr float kHalf = 0.5F;
   if (material.alpha_mode == AlphaMode::kBlend) return {material.base_alpha * solid, kHalf};
   if (solid < kHalf) return kNotThere;

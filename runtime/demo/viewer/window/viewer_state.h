@@ -80,9 +80,14 @@ struct ViewerState {
     shows_spheres = true;
   }
 
-  void remove_lamp(std::size_t k) { lights.erase(lights.begin() + static_cast<std::ptrdiff_t>(k)); }
+  /// The selected lamp, or sphere, stays selected if it is another.
+  void remove_lamp(std::size_t k) {
+    lights.erase(lights.begin() + static_cast<std::ptrdiff_t>(k));
+    if (k < selected) --selected;
+  }
   void remove_sphere(std::size_t k) {
     spheres.erase(spheres.begin() + static_cast<std::ptrdiff_t>(k));
+    if (k < selected_sphere) --selected_sphere;
   }
 
   static constexpr float kSpherePart = 0.03F;  ///< radius of an added sphere, part of the size
