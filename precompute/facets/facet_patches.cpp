@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <string>
 
 #include "precompute/patches/subdivision.h"
-#include "rebounce/error.h"
 #include "runtime/rays/float3_glm.h"
+#include "runtime/rays/triangle.h"
 
 namespace rebounce {
 namespace {
@@ -33,14 +32,17 @@ class FacetScene {
  private:
   void add_vertices() {
     glm::dvec3 low(INFINITY), high(-INFINITY);
-    for (const glm::dvec3& p : facets_.vertex) {
-      low = glm::min(low, p);
-      high = glm::max(high, p);
+    for (const std::uint32_t v : facets_.corner) {
+      low = glm::min(low, facets_.vertex[v]);
+      high = glm::max(high, facets_.vertex[v]);
     }
     // Single precision is finest around the origin.
     const glm::dvec3 middle = 0.5 * (low + high);
-    for (const glm::dvec3& p : facets_.vertex) scene_.position.push_back(to_float3(p - middle));
     const std::size_t count = facets_.vertex.size();
+    scene_.position.resize(count, Float3{0, 0, 0});  // vertices without a facet stay there
+    for (const std::uint32_t v : facets_.corner) {
+      scene_.position[v] = to_float3(facets_.vertex[v] - middle);
+    }
     scene_.normal.resize(count, Float3{0, 0, 1});
     scene_.base_color_texcoord.resize(count, Float2{0, 0});
     scene_.emissive_texcoord.resize(count, Float2{0, 0});
@@ -48,18 +50,39 @@ class FacetScene {
     scene_.materials.resize(1);
   }
 
+  /// The corners of a facet without those that repeat the one before.
+  std::vector<std::uint32_t> distinct_corners(std::size_t facet) const {
+    const auto at = [&](std::uint32_t v) { return facets_.vertex[v]; };
+    std::vector<std::uint32_t> distinct;
+    for (const std::uint32_t v : facets_.corners(facet)) {
+      if (distinct.empty() || at(v) != at(distinct.back())) distinct.push_back(v);
+    }
+    while (at(distinct.back()) == at(distinct.front())) distinct.pop_back();
+    return distinct;
+  }
+
+  /// Whether a triangle has an area in single precision. ConformingMesh takes no others.
+  bool has_area(const Uint3& corner) const {
+    const auto at = [&](std::uint32_t v) { return to_dvec3(scene_.position[v]); };
+    return area_of({at(corner[0]), at(corner[1]), at(corner[2])}) > 0;
+  }
+
   void add_facet(std::size_t facet) {
-    const std::span<const std::uint32_t> index = facets_.corners(facet);
+    const std::vector<std::uint32_t> index = distinct_corners(facet);
     std::vector<glm::dvec3> corner;
     for (const std::uint32_t v : index) corner.push_back(facets_.vertex[v]);
     const auto triangles = triangulate(corner, glm::normalize(facets_.vector_area(facet)));
-    if (triangles.empty()) {
-      throw Error("facet " + std::to_string(facet + 1) + " crosses itself; cut it into triangles");
-    }
+    if (triangles.empty()) refuse_facet(facet, "crosses itself; cut it into triangles");
+    const std::size_t before = scene_.triangle.size();
     for (const auto& t : triangles) {
-      scene_.triangle.push_back({index[t[0]], index[t[1]], index[t[2]]});
+      const Uint3 triangle = {index[t[0]], index[t[1]], index[t[2]]};
+      if (!has_area(triangle)) continue;
+      scene_.triangle.push_back(triangle);
       scene_.triangle_material.push_back(0);
       triangle_facet_.push_back(static_cast<std::uint32_t>(facet));
+    }
+    if (scene_.triangle.size() == before) {
+      refuse_facet(facet, "is too thin for single precision; remove it");
     }
   }
 

@@ -18,7 +18,7 @@ struct FacetPatches {
 };
 
 /// `least_count` patches are aimed at where there are fewer facets. Throws Error if a facet crosses
-/// itself. The facets have passed check_facets().
+/// itself, or has no area in single precision. The facets have passed check_facets().
 FacetPatches make_facet_patches(const Facets& facets, std::size_t least_count);
 
 }  // namespace rebounce

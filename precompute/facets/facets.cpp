@@ -17,9 +17,9 @@ constexpr double kFlatness = 1e-3;
 // A facet is a line if its area is below this fraction of the square of its size.
 constexpr double kNoArea = 1e-12;
 
-[[noreturn]] void refuse_facet(std::size_t facet, const std::string& reason) {
-  throw Error("facet " + std::to_string(facet + 1) + " " + reason);
-}
+// The last triangle of a polygon is turned over if its area is below minus this part of that of the
+// others.
+constexpr double kTurnedOver = 1e-9;
 
 void check_facet(const Facets& facets, std::size_t facet) {
   const std::span<const std::uint32_t> corners = facets.corners(facet);
@@ -51,12 +51,15 @@ class EarCutter {
 
   std::vector<std::array<std::uint32_t, 3>> cut() {
     std::vector<std::array<std::uint32_t, 3>> triangles;
+    double turns = 0;  // of all triangles
     while (left_.size() > 3) {
       const std::size_t ear = shortest_ear();
       if (ear == left_.size()) return {};
       triangles.push_back({before(ear), left_[ear], after(ear)});
+      turns += turn(before(ear), left_[ear], after(ear));
       left_.erase(left_.begin() + static_cast<std::ptrdiff_t>(ear));
     }
+    if (turn(left_[0], left_[1], left_[2]) < -kTurnedOver * turns) return {};
     triangles.push_back({left_[0], left_[1], left_[2]});
     return triangles;
   }
@@ -107,6 +110,10 @@ glm::dvec3 Facets::vector_area(std::size_t facet) const {
     sum += glm::cross(vertex[index[k - 1]] - origin, vertex[index[k]] - origin);
   }
   return 0.5 * sum;
+}
+
+void refuse_facet(std::size_t facet, const std::string& reason) {
+  throw Error("facet " + std::to_string(facet + 1) + " " + reason);
 }
 
 void check_facets(const Facets& facets) {

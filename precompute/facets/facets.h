@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <span>
+#include <string>
 #include <vector>
 
 namespace rebounce {
@@ -43,6 +44,9 @@ struct Facets {
 /// a facet has fewer than three corners, no area, or corners that are off its plane by more than a
 /// thousandth of its size; or if there is no facet.
 void check_facets(const Facets& facets);
+
+/// Throws Error: facet `facet` (from 0; the message counts from 1), and what is wrong with it.
+[[noreturn]] void refuse_facet(std::size_t facet, const std::string& reason);
 
 /// The corners of a flat polygon as triangles, three indices of `corner` each, counter-clockwise as
 /// the polygon is. The shortest diagonals are cut first, for triangles that are not thin. Empty if

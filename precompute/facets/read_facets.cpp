@@ -11,6 +11,7 @@
 #include <string>
 #include <string_view>
 
+#include "precompute/import/file_extension.h"
 #include "rebounce/error.h"
 
 namespace rebounce {
@@ -112,8 +113,10 @@ Facets parse_text_stl(TextLines lines) {
   Facets facets;
   std::array<glm::dvec3, 3> corner;
   std::size_t count = 0;
+  bool inside = false;  // a facet
   while (lines.next()) {
     const std::string_view word = lines.word();
+    if (word == "facet" || word == "vertex") inside = true;
     if (word == "vertex") {
       if (count == 3) lines.fail("a facet has more than three corners");
       corner[count++] = lines.point();
@@ -121,8 +124,10 @@ Facets parse_text_stl(TextLines lines) {
       if (count != 3) lines.fail("a facet has fewer than three corners");
       add_triangle(facets, corner);
       count = 0;
+      inside = false;
     }
   }
+  if (inside) lines.fail("the file ends inside a facet; get a complete copy");
   return facets;
 }
 
@@ -195,10 +200,9 @@ Facets parse_vs3(TextLines lines) {
 }  // namespace
 
 Facets read_facets(const std::filesystem::path& path) {
-  std::string kind = path.extension().string();
-  for (char& c : kind) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::string kind = lower_case_extension(path);
   if (kind != ".stl" && kind != ".obj" && kind != ".vs3") {
-    throw Error(path.string() + " is not read: facets come from .stl, .obj or .vs3 files");
+    throw Error(path.string() + ": not a file of facets; give an .stl, .obj or .vs3 file");
   }
   const std::string text = read_text(path);
   const TextLines lines(path, text);

@@ -49,8 +49,8 @@ std::vector<double> row_sums(const ViewFactors& factors);
 /// elsewhere (form_factors.h). Large facets are cut inside, and their parts summed up again.
 ///
 /// The bits do not depend on the number of threads. Throws Error if the facets cannot be used
-/// (check_facets()), or are to be closed and more than a hundredth of the light of one of them gets
-/// out; Cancelled if `progress` asks to stop.
+/// (check_facets(), make_facet_patches()), or are to be closed and more than a hundredth of the
+/// light of one of them gets out; Cancelled if `progress` asks to stop.
 ViewFactors compute_view_factors(const Facets& facets, const ViewFactorSettings& settings = {},
                                  const Progress& progress = {});
 

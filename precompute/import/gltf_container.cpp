@@ -8,7 +8,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "precompute/base/json_problem.h"
+#include "precompute/import/parsed_json.h"
 #include "rebounce/error.h"
 
 namespace rebounce::gltf {
@@ -22,8 +22,6 @@ constexpr std::size_t kChunkHeaderBytes = 8;
 
 // tinygltf takes the length as 32 bits, and its base64 decoder counts in int.
 constexpr std::size_t kMaxJsonBytes = std::size_t{1} << 30;
-// Real files reach about 15 levels.
-constexpr int kMaxJsonDepth = 100;
 
 std::uint32_t read_u32(Bytes bytes, std::size_t offset) {
   return static_cast<std::uint32_t>(bytes[offset]) |
@@ -51,27 +49,6 @@ Chunk next_chunk(Bytes& rest) {
   const Chunk chunk{read_u32(rest, 4), rest.subspan(kChunkHeaderBytes, length)};
   rest = rest.subspan(kChunkHeaderBytes + length);
   return chunk;
-}
-
-// The nesting depth of brackets outside strings. It is counted before parsing, because the callback
-// of the parser takes quadratic time in the length of an array.
-int nesting_depth(Bytes text) {
-  int depth = 0;
-  int deepest = 0;
-  bool in_string = false;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const char character = static_cast<char>(text[i]);
-    if (in_string && character == '\\') {
-      ++i;
-    } else if (character == '"') {
-      in_string = !in_string;
-    } else if (!in_string && (character == '[' || character == '{')) {
-      deepest = std::max(deepest, ++depth);
-    } else if (!in_string && (character == ']' || character == '}')) {
-      --depth;
-    }
-  }
-  return deepest;
 }
 
 // Throws Error if a file that is no .glb cannot be a .gltf either.
@@ -135,16 +112,10 @@ Container split_container(Bytes file) {
 
 nlohmann::json parse_json(Bytes text) {
   if (text.size() > kMaxJsonBytes) throw Error("the JSON part is larger than 1 GiB");
-  if (nesting_depth(text) > kMaxJsonDepth) {
-    throw Error(fmt::format("the JSON is nested more than {} levels deep", kMaxJsonDepth));
-  }
-  try {
-    auto root = nlohmann::json::parse(text.begin(), text.end());
-    if (!root.is_object()) throw Error("this is not glTF: the JSON is not an object");
-    return root;
-  } catch (const nlohmann::json::exception& failure) {
-    throw Error("the JSON " + json_problem(failure, text.size()));
-  }
+  auto root =
+      parse_json_text({reinterpret_cast<const char*>(text.data()), text.size()}, "the JSON");
+  if (!root.is_object()) throw Error("this is not glTF: the JSON is not an object");
+  return root;
 }
 
 }  // namespace rebounce::gltf

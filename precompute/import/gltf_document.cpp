@@ -129,6 +129,22 @@ std::map<std::pair<std::size_t, std::size_t>, DracoSource> draco_sources(json& r
   return sources;
 }
 
+// Counts what moves vertices, which a static scene does without.
+void count_deformations(json& root, Warnings& warnings) {
+  for (const json& node : elements(root, "nodes")) {
+    if (node.contains("mesh") && node.contains("skin")) {
+      warnings.count("{} skinned meshes are taken in their bind pose");
+    }
+  }
+  for (json& mesh : elements(root, "meshes")) {
+    for (const json& primitive : elements(mesh, "primitives")) {
+      if (primitive.contains("targets") && !primitive.at("targets").empty()) {
+        warnings.count("{} primitives with morph targets are taken in their base shape");
+      }
+    }
+  }
+}
+
 // What a static diffuse scene uses of a document, buffers and images apart, whose data are read
 // before. All of it is checked.
 constexpr std::array kStructure{"accessors",  "asset",     "bufferViews", "cameras",
@@ -228,6 +244,7 @@ Document read_document(const std::filesystem::path& path, Warnings& warnings) {
   json root = parse_json(container.json);
   check_version_and_extensions(root);
   check_structure(root);
+  count_deformations(root, warnings);
   document.model = parse_structure(root);
   document.draco = draco_sources(root);
   read_buffers(document, hash, root, container, folder);

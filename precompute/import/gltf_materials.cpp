@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <tuple>
 
 #include "precompute/import/gltf_images.h"
@@ -25,6 +26,10 @@ constexpr auto kUnreadEmission =
 constexpr auto kUnreadTransmission =
     "{} materials have transmission in KTX2 images (KHR_texture_basisu), which are not read: their "
     "factor alone is taken";
+
+// Emission above this, cd/m², is refused: sums of light over surfaces must stay finite. The sun has
+// 2e9.
+constexpr float kBrightestEmission = 1e30F;
 
 // The parts of a textureInfo object that the importer uses, from any of its places.
 struct TextureReference {
@@ -123,8 +128,9 @@ class TextureImport {
     return texture.extensions.contains("KHR_texture_basisu") && sources_of(texture).empty();
   }
 
-  // The mean of the red channel of a texture of the asset, a fraction; 1 if it has no image.
-  double mean_red(int index) const {
+  // The mean of the red channel of a texture of the asset, a fraction; empty if no image of it can
+  // be read.
+  std::optional<double> mean_red(int index) const {
     const auto& texture = document_.model.textures.at(static_cast<std::size_t>(index));
     for (const int source : sources_of(texture)) {
       const auto image = decode(document_.images.at(static_cast<std::size_t>(source)), source);
@@ -135,7 +141,7 @@ class TextureImport {
       for (std::size_t k = 0; k < pixel_count; ++k) sum += rgba[4 * k];
       return sum / (255.0 * static_cast<double>(pixel_count));
     }
-    return 1;
+    return {};
   }
 
  private:
@@ -248,7 +254,11 @@ Float3 emitted_luminance(const tinygltf::Material& source, Warnings& warnings) {
     const double strength = extension->second.Get("emissiveStrength").GetNumberAsDouble();
     for (double& channel : factor) channel *= strength;
   }
-  return to_color(factor, warnings);
+  const Float3 luminance = to_color(factor, warnings);
+  if (std::ranges::any_of(luminance, [](float x) { return x > kBrightestEmission; })) {
+    throw Error("it emits more than 1e30 cd/m²; lower its emissiveStrength");
+  }
+  return luminance;
 }
 
 bool is_black(const Float3& color) {
@@ -300,8 +310,14 @@ class MaterialImport {
     material.transmission = to_fraction(factor);
     if (material.transmission == 0 || texture < 0) return;
     if (is_unread(texture, kUnreadTransmission)) return;
-    material.transmission *= static_cast<float>(textures_.mean_red(texture));
-    warnings_.count("the transmission textures of {} materials are taken for their mean");
+    if (const std::optional<double> mean = textures_.mean_red(texture)) {
+      material.transmission *= static_cast<float>(*mean);
+      warnings_.count("the transmission textures of {} materials are taken for their mean");
+    } else {
+      warnings_.count(
+          "{} materials have transmission textures that cannot be read: their factor alone is "
+          "taken");
+    }
   }
 
   void read_emission(const tinygltf::Material& source, Material& material,

@@ -162,7 +162,7 @@ class LightmapPages {
  public:
   explicit LightmapPages(std::vector<std::string>& names) : names_(names) {}
 
-  // kNone if the primitive has no place in a lightmap. `use` is the number of the node.
+  // kNone if the primitive has no place in a lightmap. `use` is the number of the placed node.
   std::uint32_t page(const Primitive& primitive, std::size_t use, std::size_t instance) {
     if (primitive.lightmap_texcoord.empty()) return kNone;
     const auto [entry, is_new] =
@@ -222,12 +222,6 @@ void reserve(const Document& document, std::span<const PlacedNode> nodes, Meshes
 
 void import_meshes(const Document& document, std::span<const PlacedNode> nodes,
                    std::span<const MaterialTexcoords> texcoords, Scene& scene, Warnings& warnings) {
-  for (const PlacedNode& placed : nodes) {
-    const tinygltf::Node& node = document.model.nodes[placed.node];
-    if (node.mesh >= 0 && node.skin >= 0) {
-      warnings.count("{} skinned meshes are taken in their bind pose");
-    }
-  }
   Meshes meshes(document, texcoords, warnings);
   reserve(document, nodes, meshes, scene);
   LightmapPages pages(scene.lightmap_page);
@@ -240,9 +234,10 @@ void import_meshes(const Document& document, std::span<const PlacedNode> nodes,
           const auto mesh = static_cast<std::size_t>(node.mesh);
           scene.placed_meshes.push_back({document.model.meshes[mesh].name, node.name});
         }
+        const auto use = static_cast<std::size_t>(&placed - nodes.data());
         for (std::size_t i = 0; i < instances.count; ++i) {
-          Placement(primitive, placed.world * instances.transform(i),
-                    pages.page(primitive, placed.node, i), scene)
+          Placement(primitive, placed.world * instances.transform(i), pages.page(primitive, use, i),
+                    scene)
               .append();
         }
       });

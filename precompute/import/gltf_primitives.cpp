@@ -258,9 +258,6 @@ bool is_wanted(const tinygltf::Primitive& source, Warnings& warnings) {
     warnings.count("{} primitives without positions were skipped");
     return false;
   }
-  if (!source.targets.empty()) {
-    warnings.count("{} primitives with morph targets are taken in their base shape");
-  }
   return true;
 }
 

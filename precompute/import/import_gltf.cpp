@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <new>
+#include <string>
+#include <utility>
 
 #include "precompute/import/gltf_document.h"
 #include "precompute/import/gltf_lights.h"
@@ -70,23 +72,41 @@ Scene import_document(const gltf::Document& document, double scale, gltf::Warnin
   return scene;
 }
 
-}  // namespace
+std::vector<Light> import_lights(const gltf::Document& document, double scale,
+                                 gltf::Warnings& warnings) {
+  Scene scene;
+  const auto nodes = gltf::place_nodes(document.model, scale);
+  gltf::import_lights_and_cameras(document, nodes, scale, scene, warnings);
+  return std::move(scene.lights);
+}
 
-Scene import_gltf(const std::filesystem::path& path, double scale) {
+/// What `read`(document, scale, warnings) makes of a file. Errors name the file.
+template <typename Read>
+auto import_file(const std::filesystem::path& path, double scale, Read read) {
   if (!(scale > 0) || !std::isfinite(scale)) {
     throw Error(fmt::format("the scale {} is not a positive number", scale));
   }
   try {
     gltf::Warnings warnings;
-    Scene scene = import_document(gltf::read_document(path, warnings), scale, warnings);
-    scene.name = path.filename().string();
-    for (std::string& warning : scene.warnings) warning = one_line(warning);
-    return scene;
+    return read(gltf::read_document(path, warnings), scale, warnings);
   } catch (const std::bad_alloc&) {
     throw Error(fmt::format("{}: not enough memory to import it", path.string()));
   } catch (const std::exception& failure) {
     throw Error(fmt::format("{}: {}", path.string(), failure.what()));
   }
+}
+
+}  // namespace
+
+Scene import_gltf(const std::filesystem::path& path, double scale) {
+  Scene scene = import_file(path, scale, import_document);
+  scene.name = path.filename().string();
+  for (std::string& warning : scene.warnings) warning = one_line(warning);
+  return scene;
+}
+
+std::vector<Light> import_gltf_lights(const std::filesystem::path& path, double scale) {
+  return import_file(path, scale, import_lights);
 }
 
 }  // namespace rebounce

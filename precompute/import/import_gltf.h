@@ -1,8 +1,10 @@
 #pragma once
 
 #include <filesystem>
+#include <vector>
 
 #include "precompute/import/scene.h"
+#include "rebounce/lights.h"
 
 namespace rebounce {
 
@@ -18,5 +20,8 @@ namespace rebounce {
 /// `scale` is the length of the unit of the asset in metres, > 0. It multiplies positions of all
 /// kinds and the ranges of lights; intensities stay.
 Scene import_gltf(const std::filesystem::path& path, double scale = 1);
+
+/// The lights of the same scene alone, which may be none; there need be no triangles.
+std::vector<Light> import_gltf_lights(const std::filesystem::path& path, double scale = 1);
 
 }  // namespace rebounce

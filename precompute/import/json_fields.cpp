@@ -5,20 +5,18 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <glm/geometric.hpp>
 #include <iterator>
 #include <limits>
 
-#include "precompute/base/json_problem.h"
+#include "precompute/import/parsed_json.h"
 #include "rebounce/error.h"
+#include "runtime/rays/float3_glm.h"
 
 namespace rebounce {
 namespace {
 
 using nlohmann::json;
-
-float length(const Float3& v) {
-  return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-}
 
 /// A number in single precision, infinite beyond its range; NaN for what is none.
 float as_float(const json& value) {
@@ -86,13 +84,16 @@ Float3 Field::triple(const std::string& name, float lowest, const Float3& fallba
 
 Float3 Field::vector(const std::string& name, const Float3& fallback) const {
   const Float3 v = triple(name, kAnyNumber, fallback);
-  if (!(length(v) > 1e-20F)) fail(name, "a vector that is not zero");
+  if (v == Float3{0, 0, 0}) fail(name, "a vector that is not zero");
   return v;
 }
 
 Float3 Field::unit_vector(const std::string& name, const Float3& fallback) const {
   Float3 v = vector(name, fallback);
-  const float size = length(v);
+  // First by a power of two, which rounds nothing: the squares must be in the range of floats.
+  const int exponent = std::ilogb(std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])}));
+  for (float& x : v) x = std::ldexp(x, -exponent);
+  const float size = glm::length(to_glm(v));
   for (float& x : v) x /= size;
   return v;
 }
@@ -101,12 +102,7 @@ json read_json_object(const std::filesystem::path& path, const std::string& cont
   std::ifstream stream(path, std::ios::binary);
   if (!stream) throw Error("cannot open " + path.string() + "; check the name");
   const std::string text{std::istreambuf_iterator<char>(stream), {}};
-  json document;
-  try {
-    document = json::parse(text);
-  } catch (const json::exception& error) {
-    throw Error(path.string() + " " + json_problem(error, text.size()));
-  }
+  json document = parse_json_text(text, path.string());
   if (!document.is_object()) {
     throw Error(path.string() + ": must hold an object with \"" + content + "\"");
   }

@@ -5,15 +5,18 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "precompute/import/file_extension.h"
 #include "precompute/import/import_gltf.h"
 #include "precompute/import/json_fields.h"
 #include "rebounce/error.h"
 #include "rebounce/lights.h"
 #include "rebounce/sky.h"
 #include "runtime/lights/lamp_kind.h"
+#include "runtime/rays/float3_glm.h"
 
 namespace rebounce {
 namespace {
@@ -21,10 +24,6 @@ namespace {
 using nlohmann::json;
 
 constexpr std::size_t kLargestProfileBytes = std::size_t{16} << 20U;
-
-float length_of(const Float3& v) {
-  return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-}
 
 /// Joins `words` as in "a, b and c".
 template <typename Words>
@@ -95,10 +94,8 @@ void read_cone(const Field& light_field, Light& light) {
 Float3 read_tangent(const Field& field, const Float3& direction) {
   const Float3 fallback = std::abs(direction[0]) < 0.9F ? Float3{1, 0, 0} : Float3{0, 0, 1};
   const Float3 t = field.triple("tangent", kAnyNumber, fallback);
-  const Float3 across = {direction[1] * t[2] - direction[2] * t[1],
-                         direction[2] * t[0] - direction[0] * t[2],
-                         direction[0] * t[1] - direction[1] * t[0]};
-  if (!(length_of(across) > 1e-3F * length_of(t)) || length_of(t) <= 0) {
+  const glm::vec3 across = glm::cross(to_glm(direction), to_glm(t));
+  if (!(glm::length(across) > 1e-3F * glm::length(to_glm(t)))) {
     field.fail("tangent", "a vector that does not lie along the direction");
   }
   return t;
@@ -201,7 +198,10 @@ std::vector<EmitterScale> read_emitters(const Field& root) {
     const json material = field.object.value("material", json());
     if (!material.is_string()) field.fail("material", "the name of a material of the scene");
     EmitterScale emitter{material.get<std::string>(), field.triple("color", 0, {1, 1, 1})};
-    for (float& x : emitter.scale) x *= field.number("scale", 0, 1);
+    for (float& x : emitter.scale) {
+      x *= field.number("scale", 0, 1);
+      if (std::isinf(x)) field.fail("scale", "finite when \"color\" is multiplied by it");
+    }
     emitters.push_back(emitter);
   }
   return emitters;
@@ -270,11 +270,11 @@ LightSetup read_json(const std::filesystem::path& path) {
 
 }  // namespace
 
-LightSetup read_lights(const std::filesystem::path& path) {
-  const std::string extension = path.extension().string();
+LightSetup read_lights(const std::filesystem::path& path, double scale) {
+  const std::string extension = lower_case_extension(path);
   if (extension != ".glb" && extension != ".gltf") return read_json(path);
   LightSetup setup;
-  setup.lights = import_gltf(path).lights;
+  setup.lights = import_gltf_lights(path, scale);
   if (setup.lights.empty()) throw Error(path.string() + " has no KHR_lights_punctual lights");
   return setup;
 }

@@ -23,7 +23,8 @@ struct LightSetup {
 };
 
 /// Reads lights from a .json file (notes/reference/light_file.md), or from a .glb or .gltf with
-/// KHR_lights_punctual. Throws Error naming the file, the light and the field that is wrong.
-LightSetup read_lights(const std::filesystem::path& path);
+/// KHR_lights_punctual. `scale` is the length of the unit of the .glb or .gltf in metres, > 0; a
+/// .json file is in metres. Throws Error naming the file, the light and the field that is wrong.
+LightSetup read_lights(const std::filesystem::path& path, double scale = 1);
 
 }  // namespace rebounce

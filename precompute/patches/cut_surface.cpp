@@ -43,6 +43,8 @@ class SurfaceCutter {
     for (std::uint32_t t = 0; t < sides_.size(); ++t) {
       if (opacity.stopping_part(t) == 0) sides_[t] = {SideKind::kOpening, SideKind::kOpening};
     }
+    // Without patches to count, cuts would go on for ever.
+    if (!is_lit()) refuse_unlit_scene(scene_);
     const double scene_size = mean_patch_size(scene_, patches_per_triangle(), 1);
     inherit_sides(subdivide(scene_, patches_per_triangle(), settings_, density_weights(tracer)));
     if (!lamp_light_.empty()) lamp_light_.measure(scene_, sides_, tracer);
@@ -53,6 +55,10 @@ class SurfaceCutter {
   }
 
  private:
+  bool is_lit() const {
+    return std::ranges::any_of(sides_, [](const TriangleSides& s) { return s.patch_count() > 0; });
+  }
+
   std::vector<std::uint8_t> patches_per_triangle() const {
     std::vector<std::uint8_t> count;
     count.reserve(sides_.size());
@@ -150,6 +156,10 @@ class SurfaceCutter {
 
 CutSurface cut_surface(Scene scene, const SubdivisionSettings& settings, const Progress& progress) {
   return SurfaceCutter(std::move(scene), settings, progress).cut();
+}
+
+void refuse_unlit_scene(const Scene& scene) {
+  throw Error("scene " + scene.name + " has no surface that light can reach");
 }
 
 }  // namespace rebounce

@@ -29,8 +29,11 @@ struct CutSurface {
 /// Drops slivers, cuts triangles where others touch them (contact_cuts.h), finds their lit sides
 /// (lit_sides.h), and bisects those that are large beside a patch (subdivision.h), are covered in
 /// part (covers.h), or lie where the light of the scene's lamps varies (lamp_light.h). Throws Error
-/// if nothing but slivers is there, Cancelled if asked to stop.
+/// if nothing but slivers is there or no side is lit, Cancelled if asked to stop.
 CutSurface cut_surface(Scene scene, const SubdivisionSettings& settings,
                        const Progress& progress = {});
+
+/// Throws Error: no side of `scene` is lit.
+[[noreturn]] void refuse_unlit_scene(const Scene& scene);
 
 }  // namespace rebounce

@@ -22,7 +22,8 @@ namespace rebounce {
 ///
 /// Up to sixteen sides close together are tested together: by 16 paths in all if these show that
 /// they are lit, by 64 if the sides are alike. Only sides that differ from the others, or are in
-/// between, get up to 128 paths of their own; tiny ones get 32.
+/// between, get up to 128 paths of their own; tiny ones are decided by 32 unless they had as many
+/// before.
 ///
 /// `scene`, `tracer` and `sides` [t] are those of find_lit_sides(). Deterministic. Throws Cancelled
 /// if asked to stop.

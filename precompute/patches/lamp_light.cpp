@@ -73,7 +73,7 @@ void LampLight::place_emitters(const Scene& scene) {
                            area_of(corners_of(scene, t)) * mean_luminance(scene, t));
   }
   const double part = power_before.back() / kEmitterPoints;
-  if (!(part > 0)) return;
+  if (!(part > 0) || !std::isfinite(part)) return;
   for (std::uint32_t k = 0; k < kEmitterPoints; ++k) {
     const auto after = std::ranges::upper_bound(power_before, (k + 0.5) * part);
     const auto t = static_cast<std::uint32_t>(after - power_before.begin() - 1);

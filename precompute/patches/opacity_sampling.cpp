@@ -67,7 +67,8 @@ class TriangleSampler {
         std::max({std::hypot(a[0], a[1]), std::hypot(b[0], b[1]), std::hypot(c[0], c[1])});
     const double level = 0.5 * std::log2((area + longest) / kTexelsPerMicroTriangle);
     if (!(level < OpacityMaps::kMaxLevel)) return OpacityMaps::kMaxLevel;
-    return std::max(1, static_cast<int>(std::ceil(level)));
+    // It is minus infinity where all corners have the same coordinates.
+    return static_cast<int>(std::ceil(std::max(level, 1.0)));
   }
 
   double opacity_of(std::uint32_t micro_triangle, int level) const {

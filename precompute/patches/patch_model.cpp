@@ -199,7 +199,7 @@ class PatchModelBuilder {
     }
     const std::vector<std::uint32_t> position = weld_elements();
     const std::size_t count = element_triangle_.size();
-    if (count == 0) throw Error("scene " + scene_.name + " has no surface that light can reach");
+    if (count == 0) refuse_unlit_scene(scene_);
     elements_.resize(count);
     patch_area_ = mean_patch_area();
 #pragma omp parallel for schedule(dynamic, 256)

@@ -35,6 +35,10 @@ class LinkBuilder {
   LinkBuilder(const PatchModel& model, const RayTracer& tracer, const FormFactorSettings& settings,
               std::span<const float> weight = {});
 
+  // Its parts refer to each other.
+  LinkBuilder(const LinkBuilder&) = delete;
+  LinkBuilder& operator=(const LinkBuilder&) = delete;
+
   /// The links for `epsilon`, in place of settings.link_epsilon. When called again, links that are
   /// near enough stay, so that it takes a part of the time. Throws Error if epsilon is not above 0
   /// or not below the last one, Cancelled if `progress` asks to stop.

@@ -44,8 +44,9 @@ double largest_row_error(std::span<const double> sum, std::span<const RowSumTarg
 /// direct-exchange areas in zonal analysis", 1986, with two differences. The weights are the
 /// variances of the entries, so that pairs in penumbrae change and fully visible pairs stay.
 /// Targets that are measured (rows that escape in part) pull only as strongly as they are certain.
-/// An entry changes by at most half of its value. An entry that reaches this bound is fixed there,
-/// with variance 0, and the others share the rest.
+/// An entry shrinks by at most half of its value, and grows by at most half or, if that is more, to
+/// its unoccluded area. An entry that reaches a bound is fixed there, with variance 0, and the
+/// others share the rest.
 ClosureReport enforce_closure(ExchangeRows& rows, std::span<const double> area,
                               std::span<const RowSumTarget> target);
 

@@ -78,7 +78,7 @@ TEST_F(ReadFacets, OfView3d) {
 
 TEST_F(ReadFacets, RefusesWhatItCannotUse) {
   test::expect_error([&] { read_facets(folder_ / "no.stl"); }, "cannot read");
-  expect_refused("a.ply", "ply", "facets come from .stl, .obj or .vs3 files");
+  expect_refused("a.ply", "ply", "give an .stl, .obj or .vs3 file");
   expect_refused("a.stl", "solid nothing\n", "has no facets");
   expect_refused("b.stl", binary_stl(3, "cut off").substr(0, 150), "has no facets");
   expect_refused("c.stl", "facet\nvertex 0 0\n", "line 2: a number is missing");
@@ -89,6 +89,10 @@ TEST_F(ReadFacets, RefusesWhatItCannotUse) {
   expect_refused("h.vs3", "F 3\nV 2 0 0 0\n", "line 2: vertices are not numbered");
   expect_refused("i.vs3", "V 1 0 0 0\nV 2 1 0 0\nV 3 0 1 0\nS 1 1 2 3 0 2 0 0.9 part\n",
                  "line 4: surfaces that are parts of others");
+  const std::string whole = "solid\nfacet\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendfacet\n";
+  for (const char* line : {"facet normal 0 0 1\n", "vertex 0 0 0\n"}) {
+    expect_refused("j.stl", whole + line, "line 7: the file ends inside a facet");
+  }
 }
 
 }  // namespace

@@ -140,6 +140,30 @@ TEST(ViewFactors, OfConcaveFacets) {
   EXPECT_NEAR(factor(whole, 0, 1), factor(parts, 0, 1) + factor(parts, 0, 2), 1e-4);
 }
 
+TEST(ViewFactors, CornersThatFallTogetherCountOnce) {
+  // Of two unit squares a metre apart one has a corner twice. A third facet has them cut.
+  const Polygon above = {{0, 0, 1}, {0, 1, 1}, {1, 1, 1}, {1, 0, 1}};
+  const Polygon aside = {{50, 50, 50}, {50, 51, 50}, {51, 50, 50}};
+  for (const double between : {0.0, 1e-9}) {
+    const Polygon below = {{0, 0, 0}, {1, 0, 0}, {1, between, 0}, {1, 1, 0}, {0, 1, 0}};
+    const ViewFactors f = compute_view_factors(facets_of({below, above, aside}),
+                                               {.quality = FormFactorQuality::kLow});
+    EXPECT_NEAR(factor(f, 0, 1), 0.199825, 1e-3) << between;
+  }
+}
+
+TEST(ViewFactors, VerticesWithoutAFacetChangeNothing) {
+  Facets facets = facets_of(box({0, 0, 0}, {1, 2, 3}, true));
+  const auto compute = [&] {
+    return compute_view_factors(facets, {.quality = FormFactorQuality::kLow});
+  };
+  const ViewFactors before = compute();
+  facets.vertex.emplace_back(1e7, 1e7, 1e7);
+  const ViewFactors after = compute();
+  EXPECT_EQ(before.factor, after.factor);
+  EXPECT_EQ(before.sky, after.sky);
+}
+
 TEST(ViewFactors, OfAStreetAreRightWithoutRepair) {
   const ViewFactors f = compute_view_factors(test::street_canyon(1));
   ASSERT_GT(f.size(), 5000U);
@@ -196,6 +220,11 @@ TEST(ViewFactors, RefuseWhatTheyCannotUse) {
                "facet 1 is not flat");
   expect_error(compute(facets_of({{{0, 0, 0}, {2, 2, 0}, {2, 0, 0}, {0.5, 1.5, 0}, {0, 1, 0}}})),
                "facet 1 crosses itself");
+  expect_error(compute(facets_of({{{0, 0, 0}, {3, 0, 0}, {0.5, 1, 0}, {3, 3, 0}}})),
+               "facet 1 crosses itself");
+  const Polygon above = {{0, 0, 1}, {0, 1, 1}, {1, 1, 1}, {1, 0, 1}};
+  expect_error(compute(facets_of({square, above, {{0, 0, 0.5}, {1, 0, 0.5}, {1, 1e-9, 0.5}}})),
+               "facet 3 is too thin for single precision");
   Facets facets = facets_of({square});
   facets.corner[1] = 9;
   expect_error(compute(facets), "facet 1 names vertex 10 of 4");

@@ -171,12 +171,17 @@ TEST_F(ImportGltf, HierarchyMayBeVeryDeep) {
 }
 
 TEST_F(ImportGltf, NodeWithTwoParentsStandsBelowBoth) {
+  triangle_.primitive()["attributes"]["TEXCOORD_1"] =
+      triangle_.add_accessor<float>({0, 0, 1, 0, 0, 1}, "VEC2", 2);
   triangle_.add_node({{"children", {0}}, {"translation", {5, 0, 0}}});
   triangle_.add_node({{"children", {0}}, {"translation", {7, 0, 0}}});
   const Scene scene = import(triangle_);
   ASSERT_EQ(scene.triangle.size(), 2U);
   expect_near(scene.position[0], {5, 0, 0});
   expect_near(scene.position[3], {7, 0, 0});
+  ASSERT_EQ(scene.lightmap_page.size(), 2U);
+  EXPECT_EQ(scene.lightmap_texcoord[0].page, 0U);
+  EXPECT_EQ(scene.lightmap_texcoord[3].page, 1U);
 }
 
 TEST_F(ImportGltf, TakesTheSceneThatIsNamed) {
@@ -338,6 +343,16 @@ TEST_F(ImportGltf, PointsAndLinesAreSkippedAndCounted) {
   EXPECT_EQ(scene.triangle.size(), 1U);
   ASSERT_EQ(scene.warnings.size(), 1U);
   EXPECT_NE(scene.warnings[0].find("4 primitives"), std::string::npos) << scene.warnings[0];
+}
+
+TEST_F(ImportGltf, SkinsAndMorphTargetsAreCounted) {
+  triangle_.root["nodes"][0]["skin"] = 0;
+  triangle_.primitive()["targets"] = json::array({{{"POSITION", 0}}});
+  const Scene scene = import(triangle_);
+  EXPECT_EQ(scene.triangle.size(), 1U);
+  EXPECT_EQ(scene.warnings, (std::vector<std::string>{
+                                "1 skinned meshes are taken in their bind pose",
+                                "1 primitives with morph targets are taken in their base shape"}));
 }
 
 TEST_F(ImportGltf, DegenerateTrianglesAreDroppedAndCounted) {

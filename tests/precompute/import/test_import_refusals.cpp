@@ -352,6 +352,9 @@ TEST_F(ImportRefusals, MaterialFactorsOfTheWrongKind) {
       {"emissiveFactor", {1, 1, 1}},
       {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 1e200}}}}}};
   expect_refused(triangle_, {"materials[0] \"Lamp\"", "finite"});
+  json& extensions = triangle_.root["materials"][0]["extensions"];
+  extensions["KHR_materials_emissive_strength"]["emissiveStrength"] = 2e38;
+  expect_refused(triangle_, {"materials[0] \"Lamp\"", "1e30", "emissiveStrength"});
 }
 
 /// Every byte of a small asset set to something else: imported or refused, never more.

@@ -171,6 +171,22 @@ TEST_F(TexturedTriangle, MissingOrDamagedImageIsWhiteWithAWarning) {
   }
 }
 
+TEST_F(TexturedTriangle, TransmissionIsTheMeanOfItsTextureWhereThatCanBeRead) {
+  triangle_.root["materials"][0] = {
+      {"extensions",
+       {{"KHR_materials_transmission",
+         {{"transmissionFactor", 0.5}, {"transmissionTexture", {{"index", 0}}}}}}}};
+  Scene scene = import(triangle_);
+  EXPECT_FLOAT_EQ(scene.materials[0].transmission, 0.5F * 94 / 255);
+  ASSERT_EQ(scene.warnings.size(), 1U);
+  EXPECT_TRUE(scene.warnings[0].ends_with("are taken for their mean")) << scene.warnings[0];
+  triangle_.root["images"][0] = {{"uri", "absent.png"}};
+  scene = import(triangle_);
+  EXPECT_EQ(scene.materials[0].transmission, 0.5F);
+  ASSERT_EQ(scene.warnings.size(), 1U);
+  EXPECT_NE(scene.warnings[0].find("cannot be read"), std::string::npos) << scene.warnings[0];
+}
+
 TEST_F(TexturedTriangle, ImageBesideTheFileMayHaveSpacesInItsName) {
   test::write_bytes(folder_.path() / "a picture.png",
                     std::string(kOneTexelPng.begin(), kOneTexelPng.end()));

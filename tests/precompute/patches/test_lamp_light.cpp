@@ -161,6 +161,12 @@ TEST(LampLight, LampsInSurfacesAndTooBrightOnesDoNoHarm) {
   }
 }
 
+TEST(LampLight, SurfacesWithEmissionBeyondNumbersCountAsNone) {
+  Scene scene = test::room_with_block({0.5F, 0.5F, 0.5F});
+  scene.materials[0].emitted_luminance = {2e38F, 2e38F, 2e38F};
+  EXPECT_EQ(mesh_of(patches_of(scene, 4)), mesh_of(patches_of(scene, 0)));
+}
+
 TEST(LampLight, IntensityAndNumberOfThreadsChangeNothing) {
   Scene scene = lit_room();
   const auto make = [&] { return mesh_of(patches_of(scene, 4)); };

@@ -6,6 +6,7 @@
 
 #include "precompute/patches/lit_sides.h"
 #include "rebounce/error.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/test_scenes.h"
 
 namespace rebounce::test_patch_model {
@@ -120,6 +121,19 @@ TEST(PatchModel, DropsSliversBelowThePrecisionOfRays) {
   Scene nothing = test::empty_scene();
   test::add_polygon(nothing, sliver);
   EXPECT_THROW(make_patch_model(nothing, {}), Error);
+}
+
+TEST(PatchModel, OfNothingButOpeningsIsRefused) {
+  Scene glass = test::empty_scene();
+  test::add_box(glass, {0, 0, 0}, {1, 1, 1}, true);
+  Scene air = glass;
+  glass.materials[0].transmission = 1;
+  air.materials[0].alpha_mode = AlphaMode::kBlend;
+  air.materials[0].base_alpha = 0;
+  for (const Scene& scene : {glass, air}) {
+    test::expect_error([&] { make_patch_model(scene, {.patch_count = 100}); },
+                       "no surface that light can reach");
+  }
 }
 
 }  // namespace
