@@ -1,5 +1,7 @@
 #include "rebounce/build.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -73,6 +75,14 @@ class TransferBuild {
     data_.textures = scene.textures;
     data_.cameras = scene.cameras;
     data_.lights = scene.lights;
+    const auto left_out =
+        std::ranges::count_if(data_.lights, [](const Light& light) { return !is_punctual(light); });
+    if (left_out > 0) {
+      report_.warnings.push_back(fmt::format(
+          "lamps with a surface or a profile that shape the patches but are not kept in the file: "
+          "{}; name them where it is lit",
+          left_out));
+    }
     data_.record.generator = std::string("rebounce ") + version();
     data_.record.scene_name = scene.name;
     data_.record.scene_hash = scene.hash;
@@ -121,7 +131,7 @@ class TransferBuild {
     data_.patches.absorbed = std::move(escaped.absorbed);
     data_.sky_cells = std::move(escaped.sky_cells);
     data_.mesh = std::move(model_.mesh);
-    make_outputs(model_.shown_patch, *tracer_, settings_, data_, report_, clock_);
+    make_outputs(model_.shown_patch, *tracer_, decided_, data_, report_, clock_);
   }
 
   /// Makes the operator and measures its error.
@@ -140,6 +150,7 @@ class TransferBuild {
 
   /// All that follows on the scene.
   TransferData run(Scene scene) {
+    check_settings(settings_);
     if (settings_.lights) scene.lights = own_lights(settings_);
     describe_scene(scene);
     make_patches(std::move(scene));
@@ -162,8 +173,9 @@ class TransferBuild {
     return *tracer_;
   }
 
-  /// The data, with those form factors alone that are to be kept.
+  /// The data, with those lamps and form factors alone that are to be kept.
   TransferData take() {
+    std::erase_if(data_.lights, [](const Light& light) { return !is_punctual(light); });
     if (!settings_.store_form_factors) data_.exchange = {};
     if (settings_.form_factor_tolerance == 0) data_.compressed_form_factors.reset();
     return std::move(data_);

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "rebounce/operators.h"
-#include "transfer/operator/transfer_operator.h"
+#include "transfer/format/hierarchical_storage.h"
+#include "transfer/operator/hierarchical_operator.h"
 
 namespace rebounce {
 namespace {
@@ -64,11 +64,13 @@ std::vector<std::string> build_advice(const TransferData& data, const BuildRepor
   const std::size_t n = data.patches.size();
   const double bytes = static_cast<double>(data.transfer->bytes()) /
                        static_cast<double>(std::max<std::size_t>(n, 1));
-  if (data.transfer->kind() == OperatorKind::kHierarchical && bytes > kManyBytes) {
+  const auto* const blocks = dynamic_cast<const HierarchicalOperator*>(data.transfer.get());
+  if (blocks != nullptr && bytes > kManyBytes) {
+    const bool in_8_bits = are_integers(blocks->storage().precision.bases);
     advice.push_back(
         fmt::format("{:.0f} bytes per patch are many, as much is seen in part only; a larger "
-                    "--tolerance, --precision q8, --receivers or --sources take fewer",
-                    bytes));
+                    "--tolerance,{} --receivers or --sources take fewer",
+                    bytes, in_8_bits ? "" : " --precision q8,"));
   }
   if (const double reflectance = mean_reflectance(data.patches); reflectance > kHighReflectance) {
     advice.push_back(

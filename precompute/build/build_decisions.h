@@ -5,6 +5,9 @@
 
 namespace rebounce {
 
+/// Throws Error if a setting is out of its range, whatever the scene.
+void check_settings(const BuildSettings& settings);
+
 /// The settings with what was left open decided for a scene of these patches. Throws Error if they
 /// contradict each other.
 BuildSettings decide(BuildSettings settings, const PatchModel& model);

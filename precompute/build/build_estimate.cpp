@@ -241,7 +241,7 @@ void refuse_if_too_large(const CostEstimate& estimate, std::uint64_t limit_bytes
   if (estimate.peak_bytes <= limit_bytes) return;
   throw Error(fmt::format(
       "{} patches (from {} triangles) need about {}, the limit is {}; ask for "
-      "fewer patches, simplify the scene or raise --memory-limit",
+      "fewer patches, simplify the scene or raise the memory limit (--memory-limit)",
       estimate.patch_count, triangle_count, in_gib(estimate.peak_bytes), in_gib(limit_bytes)));
 }
 

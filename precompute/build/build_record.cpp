@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "precompute/base/json_text.h"
+
 namespace rebounce {
 namespace {
 
@@ -49,7 +51,7 @@ std::string settings_json(const BuildSettings& settings, double form_factor_tole
                       {"lightmap_padding", settings.lightmap.padding}};
   if (is_hierarchical(settings)) json["tolerance"] = settings.tolerance;
   if (settings.operator_kind == OperatorKind::kLowRank) json["rank"] = settings.rank;
-  return json.dump();
+  return json_text(json);
 }
 
 nlohmann::json json_of(const SampledError& error) {
@@ -101,7 +103,7 @@ std::string report_json(const BuildReport& report, const std::vector<KindError>&
                            {"whole", json_of(report.whole_error->whole)},
                            {"lights", report.whole_error->light_count}};
   }
-  return json.dump();
+  return json_text(json);
 }
 
 }  // namespace

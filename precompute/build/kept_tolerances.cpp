@@ -19,8 +19,8 @@ double finer_tolerance(const BuildRecord& record) {
 void check_tolerances(const BuildRecord& record, const BuildReport& report, bool has_form_factors) {
   if (record.tolerance > 0 && record.error_mean > record.tolerance) {
     throw Error(fmt::format(
-        "the operator misses its tolerance: the mean error is {:.2g}, the tolerance {:.2g}; "
-        "raise --tolerance, or use --precision f32 or --operator dense",
+        "the operator misses its tolerance: the mean error is {:.2g}, the tolerance {:.2g}; the "
+        "file is written: raise --tolerance, or use --precision f32 or --operator dense",
         record.error_mean, record.tolerance));
   }
   if (record.tolerance > 0 && record.error_max > kLargestOverMean * record.tolerance) {
@@ -35,8 +35,8 @@ void check_tolerances(const BuildRecord& record, const BuildReport& report, bool
       report.whole_error->whole.mean > record.tolerance) {
     const SampledError &whole = report.whole_error->whole, &links = report.whole_error->links;
     throw Error(fmt::format(
-        "the light misses the tolerance: with what links are off, the mean error is {:.2g}, the "
-        "tolerance {:.2g}; compression alone is off by {:.2g}, links by {:.2g}; the file is "
+        "links and compression together miss the tolerance: the mean error is {:.2g}, the "
+        "tolerance {:.2g}; that of compression alone is {:.2g}, that of links {:.2g}; the file is "
         "written: count it as one of tolerance {:.2g}, or take a smaller --link-epsilon or "
         "--form-factors pairs",
         whole.mean, record.tolerance, record.error_mean, links.mean, whole.mean));
@@ -44,7 +44,7 @@ void check_tolerances(const BuildRecord& record, const BuildReport& report, bool
   if (has_form_factors && report.form_factor_error->mean > report.form_factor_tolerance) {
     throw Error(fmt::format(
         "the compressed form factors miss their tolerance: the mean error is {:.2g}, the tolerance "
-        "{:.2g}; raise --compress-form-factors, or leave it out",
+        "{:.2g}; the file is written: raise --compress-form-factors, or leave it out",
         report.form_factor_error->mean, report.form_factor_tolerance));
   }
 }

@@ -7,6 +7,7 @@
 #include "precompute/build/build_estimate.h"
 #include "precompute/build/exchange_stage.h"
 #include "precompute/build/operator_stage.h"
+#include "precompute/compression/block_checkpoint.h"
 #include "precompute/exchange/links/links.h"
 #include "precompute/lights/link_error.h"
 
@@ -111,6 +112,7 @@ LinkBuild near_enough_links(PatchModel& model, const RayTracer& tracer, const Pa
 EscapedLight find_links(PatchModel& model, const RayTracer& tracer, const PatchRoles& roles,
                         bool judged, BuildSettings& decided, TransferData& data,
                         BuildReport& report, PhaseClock& clock) {
+  const BlockCheckpoint can_be_made(decided.checkpoint, {});  // throws if it cannot
   LinkBuild build = near_enough_links(model, tracer, roles, judged, decided, data, report, clock);
   return_freed_memory();  // of what finer links would have been made from
   return build;

@@ -30,10 +30,6 @@ constexpr std::size_t kFormFactorValidationCount = 64;
 // does not matter.
 constexpr double kFittingResidual = 1e-2;
 
-// Lower limit of the tolerance of form factors in half precision, whose rounding error is not far
-// below.
-constexpr double kLeastTolerance = 1e-4;
-
 using Lights = std::vector<std::vector<Float3>>;
 using Exitances = std::span<const std::vector<Float3>>;
 
@@ -101,7 +97,7 @@ double form_factor_tolerance(const BuildSettings& decided, const FittedLights& l
                              const PatchRoles& roles, std::span<const float> area) {
   if (decided.form_factor_tolerance > 0) return decided.form_factor_tolerance;
   const double part = received_part(lights.exitances, lights.radiosities, roles, area);
-  return std::max(kLeastTolerance, decided.tolerance / kToleranceOverFormFactors * part);
+  return std::max(kLeastFormFactorTolerance, decided.tolerance / kToleranceOverFormFactors * part);
 }
 
 /// What the stages of an operator from links share.

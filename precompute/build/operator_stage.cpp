@@ -108,8 +108,8 @@ void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& deci
   data.transfer = clock.run("compression again", [&](const Progress& part) {
     return compress(*dense, data, tracer, again, roles, part);
   });
-  // Lights that the first check has not seen.
-  check_operator(data, tracer, dense.get(), decided, seed + 1, report, clock);
+  // Lights that the first check has not seen: its groups have seeds that follow each other.
+  check_operator(data, tracer, dense.get(), decided, ~seed, report, clock);
 }
 
 }  // namespace rebounce

@@ -22,6 +22,10 @@ namespace rebounce {
 /// Their error adds to its own.
 inline constexpr double kToleranceOverFormFactors = 5;  // lab/060
 
+/// Lower limit of the tolerance of form factors in half precision, whose rounding error is not far
+/// below.
+inline constexpr double kLeastFormFactorTolerance = 1e-4;
+
 /// The parts of the tolerance that links and the compression of an operator from links may take.
 /// Their errors are independent of each other, so that the squares of the parts add up to 1. Finer
 /// links cost time offline, finer operators bytes and time in each frame.

@@ -27,11 +27,10 @@ void make_outputs(std::span<const std::uint32_t> shown_patch, const RayTracer& t
   });
   const bool probes = settings.probes.grid[0] > 0 || settings.probes.spacing > 0;
   const bool harmonics = settings.surface_harmonics.ray_count > 0;
-  const bool rows = settings.receiver_rows.any();
-  if ((probes || harmonics || rows) && !settings.receivers.empty()) {
+  if ((probes || harmonics) && !settings.receivers.empty()) {
     report.warnings.emplace_back(
-        "light probes, surface harmonics and rows of receivers see patches that are no receivers "
-        "without their indirect light");
+        "light probes and surface harmonics see patches that are no receivers without their "
+        "indirect light");
   }
   if (probes) {
     data.probes = clock.run("probes", [&](const Progress& part) {
@@ -51,6 +50,11 @@ void add_receiver_rows(std::span<const std::uint32_t> shown_patch, const RayTrac
                        const BuildSettings& settings, TransferData& data, BuildReport& report,
                        PhaseClock& clock) {
   ReceiverRowSettings rows = settings.receiver_rows;
+  if (rows.any() && !settings.receivers.empty()) {
+    report.warnings.emplace_back(
+        "vertices and texels with rows of their own see patches that are no receivers without "
+        "their indirect light");
+  }
   const auto make = [&](const char* phase, const RowReceivers& receivers) {
     return clock.run(phase, [&](const Progress& part) {
       return make_receiver_rows(data, shown_patch, receivers, tracer, rows,

@@ -46,7 +46,7 @@ void run(const BakeOptions& chosen, const CommonOptions& options) {
                                     {"exposure", mesh.exposure},
                                     {"camera", as_json(camera)},
                                     {"bytes", bytes}};
-    fmt::print("{}\n", summary.dump(2));
+    print_json(summary);
   } else if (!options.quiet) {
     const std::string texture =
         mesh.texture.rgb.empty()

@@ -66,6 +66,7 @@ std::shared_ptr<const TransferData> load_lit_scene(const std::filesystem::path& 
   for (const EmitterScale& emitter : setup.emitters) {
     scale_emitter(emitter, patch_material, data);
   }
+  if (!setup.emitters.empty()) data.emitted_irradiance.clear();  // it is that of other emission
   return std::make_shared<const TransferData>(std::move(data));
 }
 

@@ -5,6 +5,10 @@
 
 #include <cmath>
 #include <csignal>
+#include <cstdio>
+#include <string>
+
+#include "precompute/base/json_text.h"
 
 namespace rebounce::cli {
 namespace {
@@ -21,6 +25,12 @@ std::string readable_time(double seconds) {
   if (whole < 60) return fmt::format("{} s", whole);
   if (whole < 3600) return fmt::format("{} min {:02} s", whole / 60, whole % 60);
   return fmt::format("{} h {:02} min", whole / 3600, whole / 60 % 60);
+}
+
+/// Prints what it can: a log that cannot be written to ends no build.
+void write_text(std::FILE* to, const std::string& text) {
+  std::fwrite(text.data(), 1, text.size(), to);
+  std::fflush(to);
 }
 
 /// Empty as long as it would be a guess.
@@ -72,25 +82,28 @@ bool ProgressBar::update(std::string_view phase, double fraction) {
 void ProgressBar::draw(double fraction, double seconds) {
   constexpr int kWidth = 30;
   const int filled = static_cast<int>(fraction * kWidth);
-  fmt::print(to_, "\r\033[K{:<13} [{}{}] {:3.0f} %{}", phase_, std::string(filled, '#'),
-             std::string(kWidth - filled, '.'), 100 * fraction, time_left(fraction, seconds));
-  std::fflush(to_);
+  write_text(to_, fmt::format("\r\033[K{:<13} [{}{}] {:3.0f} %{}", phase_, std::string(filled, '#'),
+                              std::string(kWidth - filled, '.'), 100 * fraction,
+                              time_left(fraction, seconds)));
   drawn_ = true;
 }
 
 void ProgressBar::print_line(double fraction, double seconds) {
-  fmt::print(to_, "{}: {:.0f} %{}\n", phase_, 100 * fraction, time_left(fraction, seconds));
-  std::fflush(to_);
+  write_text(to_,
+             fmt::format("{}: {:.0f} %{}\n", phase_, 100 * fraction, time_left(fraction, seconds)));
 }
 
 void ProgressBar::clear() {
-  if (drawn_) fmt::print(to_, "\r\033[K");
-  std::fflush(to_);
+  if (drawn_) write_text(to_, "\r\033[K");
   drawn_ = false;
 }
 
 void print_note(const CommonOptions& options, const std::string& line) {
-  if (!options.quiet) fmt::print(stderr, "{}\n", line);
+  if (!options.quiet) write_text(stderr, line + "\n");
+}
+
+void print_json(const nlohmann::json& summary) {
+  fmt::print("{}\n", json_text(summary, 2));
 }
 
 }  // namespace rebounce::cli

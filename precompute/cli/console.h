@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
 
@@ -52,5 +53,8 @@ class ProgressBar {
 
 /// Prints `line` on standard error unless `quiet`.
 void print_note(const CommonOptions& options, const std::string& line);
+
+/// Prints the summary that --json asks for on standard output.
+void print_json(const nlohmann::json& summary);
 
 }  // namespace rebounce::cli

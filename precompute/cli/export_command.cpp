@@ -101,7 +101,7 @@ void run(const ExportOptions& chosen, const CommonOptions& options) {
   nlohmann::json summary;
   for (const NumpyArray& array : out.arrays) summary["arrays"][array.name] = array.shape;
   if (options.json) {
-    fmt::print("{}\n", summary.dump(2));
+    print_json(summary);
   } else if (!options.quiet) {
     for (const NumpyArray& array : out.arrays) {
       fmt::print("{:<18} [{}]\n", array.name, fmt::join(array.shape, ", "));

@@ -61,7 +61,7 @@ void run(const std::string& path, const CommonOptions& options) {
   auto data = std::make_shared<const TransferData>(load_transfer_file(path));
   const std::uint64_t file_bytes = std::filesystem::file_size(path);
   if (options.json) {
-    fmt::print("{}\n", info_json(*data, file_bytes).dump(2));
+    print_json(info_json(*data, file_bytes));
   } else if (!options.quiet) {
     Engine engine(data);
     fmt::print("{}", info_text(*data, file_bytes, typical_times(engine)));

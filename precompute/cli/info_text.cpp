@@ -156,9 +156,8 @@ std::string error_text(const json& report) {
                         percent(number_in(e, "bound")));
   }
   if (rows.empty()) return "";
-  return "\nError of the indirect light on all patches against the exact solution for them, "
-         "measured "
-         "when the file was made:\n" +
+  return "\nError of the indirect light against the solution with the form factors that the "
+         "operator is made from, measured when the file was made:\n" +
          fmt::format("  {:<10} {:>6} {:>9} {:>9} {:>9}\n", "light", "lights", "mean", "largest",
                      "bound") +
          rows +
@@ -174,15 +173,15 @@ std::string whole_error_text(const json& report) {
   const json& errors = report["whole_error"];
   std::string rows;
   for (const auto& [key, label] :
-       {std::pair("links", "links alone"), std::pair("whole", "all in all")}) {
+       {std::pair("links", "links alone"), std::pair("whole", "links and compression")}) {
     if (!errors.is_object() || !errors.contains(key)) continue;
     const json& e = errors[key];
-    rows += fmt::format("  {:<12} {:>9} +- {:<9} {:>9} +- {}\n", label,
+    rows += fmt::format("  {:<21} {:>9} +- {:<9} {:>9} +- {}\n", label,
                         percent(number_in(e, "mean")), percent(number_in(e, "mean_confidence")),
                         percent(number_in(e, "max")), percent(number_in(e, "max_confidence")));
   }
   if (rows.empty()) return "";
-  return "\nWith what the links are off that it was made from, under point lights, by rays (mean; "
+  return "\nError against exact form factors, under point lights, estimated by rays (mean; "
          "largest; 95 % confidence):\n" +
          rows;
 }

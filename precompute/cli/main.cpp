@@ -2,8 +2,10 @@
 #include <omp.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <exception>
 #include <new>
+#include <string>
 
 #include "precompute/cli/commands.h"
 #include "precompute/cli/console.h"
@@ -19,10 +21,14 @@ void add_common_options(CLI::App& command, rebounce::cli::CommonOptions& options
       "--json", options.json,
       "Print a machine-readable summary on standard output, other text on standard error");
   command.add_flag("--quiet", options.quiet, "No progress and no summary");
-  command.add_option("--threads", options.threads, "Threads to use; 0: one per processor")
+  command
+      .add_option("--threads", options.threads,
+                  "Threads to use; 0: OMP_NUM_THREADS, or one per processor")
       ->check(CLI::Range(0, 4096))
       ->each([](const std::string& value) {
-        if (const int threads = std::stoi(value); threads > 0) omp_set_num_threads(threads);
+        // As CLI11 reads numbers: 0x4 and 010 have other bases.
+        const int threads = std::stoi(value, nullptr, 0);
+        if (threads > 0) omp_set_num_threads(threads);
       });
 }
 
@@ -72,9 +78,9 @@ int main(int argc, char** argv) {
   try {
     return run(argc, argv);
   } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "rebounce: out of memory; ask for fewer patches\n");
+    std::fputs("rebounce: out of memory; ask for fewer patches\n", stderr);
   } catch (const std::exception& error) {
-    fmt::print(stderr, "rebounce: {}\n", error.what());
+    std::fputs(("rebounce: " + std::string(error.what()) + "\n").c_str(), stderr);
   }
   return kBadInput;
 }

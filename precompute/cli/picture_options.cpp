@@ -76,8 +76,10 @@ ChosenCamera choose_camera(const std::string& wanted, const TransferData& data,
     return {look_at({n[0], n[1], n[2]}, {n[3], n[4], n[5]}, degrees * kDegree),
             CameraSource::kNumbers};
   }
-  throw Error(fmt::format("no camera \"{}\": the scene has {}; or give px,py,pz,tx,ty,tz[,degrees]",
-                          wanted, count == 0 ? "none" : camera_names(data)));
+  throw Error(
+      fmt::format("no camera \"{}\": the scene has {}; give one it has, or "
+                  "px,py,pz,tx,ty,tz[,degrees]",
+                  wanted, count == 0 ? "none" : camera_names(data)));
 }
 
 std::string as_option(const Camera& camera) {

@@ -70,12 +70,12 @@ std::string left_out(const FormFactorError& error) {
              : fmt::format(", {} from which nothing arrives left out", error.dark_count);
 }
 
-void print_json(const TransferData& data, const BuildReport& report, std::uint64_t file_bytes) {
+void print_build(const TransferData& data, const BuildReport& report, std::uint64_t file_bytes) {
   nlohmann::json summary = info_json(data, file_bytes);
-  nlohmann::json seconds;
+  nlohmann::json seconds = nlohmann::json::object();
   double total = 0;
-  for (const auto& [phase, s] : report.seconds) {
-    seconds[phase] = s;
+  for (const auto& [phase, s] : report.seconds) {  // some phases run twice
+    seconds[phase] = seconds.value(phase, 0.0) + s;
     total += s;
   }
   seconds["total"] = total;
@@ -89,7 +89,7 @@ void print_json(const TransferData& data, const BuildReport& report, std::uint64
   if (report.estimate_after_links) {
     summary["estimate_after_links"] = {{"peak_bytes", report.estimate_after_links->peak_bytes}};
   }
-  fmt::print("{}\n", summary.dump(2));
+  print_json(summary);
 }
 
 void print_summary(const TransferData& data, const BuildReport& report, std::uint64_t file_bytes) {
@@ -115,8 +115,8 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
   if (report.whole_error) {
     const SampledError &whole = report.whole_error->whole, &links = report.whole_error->links;
     fmt::print(
-        "with what links are off: {:.1e} +- {:.0e} mean, {:.1e} +- {:.0e} max (links alone {:.1e} "
-        "mean, {:.1e} max)\n",
+        "links and compression together: error {:.1e} +- {:.0e} mean, {:.1e} +- {:.0e} max (links "
+        "alone {:.1e} mean, {:.1e} max)\n",
         whole.mean, whole.mean_confidence, whole.max, whole.max_confidence, links.mean, links.max);
   }
   if (const PatchRoles& roles = data.transfer->roles(); !roles.all_are_both()) {
@@ -135,7 +135,7 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
   }
   if (report.error_without_rows) {
     fmt::print(
-        "vertices: off by {:.1e} by weights of patches alone, so they have {} of their own\n",
+        "vertices: light mixed from patches alone is off by {:.1e}, so they have {} of their own\n",
         *report.error_without_rows, data.receiver_rows.empty() ? "no rows" : "rows");
   }
   std::string times;
@@ -180,11 +180,20 @@ std::vector<std::string> names_of(const auto& table) {
 void choose_receivers(const PrecomputeOptions& chosen, ReceiverRowSettings& rows) {
   const bool for_web = chosen.reader == "web", is_open = chosen.receivers_at == kWhereNeeded;
   if (for_web && !is_open && chosen.receivers_at != "patches") {
-    throw Error("pages show no rows of receivers; with --for web take --receivers-at patches");
+    throw Error("--for web makes files without rows of receivers; give --receivers-at patches");
   }
   rows.at_vertices = chosen.receivers_at == "vertices" || (is_open && !for_web);
   rows.at_texels = chosen.receivers_at == "texels";
   if (!is_open) rows.least_error = 0;
+}
+
+/// --memory-limit in bytes; 0 if it is not given.
+std::uint64_t memory_limit_of(double gib) {
+  if (gib == 0) return 0;
+  constexpr double kMostGib = 1e9;
+  if (!(gib > 0 && gib <= kMostGib)) throw Error("--memory-limit must be from 0 to 1e9 GiB");
+  return std::max<std::uint64_t>(1,
+                                 static_cast<std::uint64_t>(gib * static_cast<double>(1ULL << 30)));
 }
 
 BuildSettings settings_of(const PrecomputeOptions& chosen) {
@@ -192,15 +201,14 @@ BuildSettings settings_of(const PrecomputeOptions& chosen) {
   parse_probes(chosen.probes, settings.probes);
   settings.receivers = split_lists(chosen.receivers);
   settings.sources = split_lists(chosen.sources);
-  if (!chosen.lights.empty()) settings.lights = read_lights(chosen.lights).lights;
+  if (!chosen.lights.empty()) settings.lights = read_lights(chosen.lights, settings.scale).lights;
   if (chosen.form_factors == "pairs") settings.exchange_source = ExchangeSource::kPairs;
   if (chosen.form_factors == "links") settings.exchange_source = ExchangeSource::kLinks;
   settings.form_factors = with_quality(quality_named(chosen.quality), settings.form_factors);
   if (!chosen.precision.empty()) settings.precision = precision_named(chosen.precision);
   settings.operator_kind = operator_kind(chosen.operator_kind);
   choose_receivers(chosen, settings.receiver_rows);
-  settings.memory_limit_bytes =
-      static_cast<std::uint64_t>(chosen.memory_limit_gib * static_cast<double>(1ULL << 30));
+  settings.memory_limit_bytes = memory_limit_of(chosen.memory_limit_gib);
   return settings;
 }
 
@@ -244,7 +252,7 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
     file_bytes = std::filesystem::file_size(chosen.output);
   }
   if (options.json) {
-    print_json(data, report, file_bytes);
+    print_build(data, report, file_bytes);
   } else if (!options.quiet) {
     print_summary(data, report, file_bytes);
   }
@@ -270,7 +278,8 @@ void add_scene_options(CLI::App& command, PrecomputeOptions& chosen) {
   command.add_option(
       "--lights", chosen.lights,
       "The scene's own lamps, in place of those of the asset: LIGHTS.json, or a .glb "
-      "that has some. Patches are finer where their light varies");
+      "that has some. Patches are finer where their light varies. Points, spots and directional "
+      "lights without a profile are kept in the file");
   command
       .add_option("--lamp-weight", subdivision.lamp_weight,
                   "How much finer patches are where the direct light of the scene's own lamps "
@@ -284,10 +293,12 @@ void add_scene_options(CLI::App& command, PrecomputeOptions& chosen) {
 
 void add_form_factor_options(CLI::App& command, PrecomputeOptions& chosen) {
   command
-      .add_option("--form-factors", chosen.form_factors,
-                  "What the operator is made from: pairs of patches, with memory in proportion to "
-                  "their number squared, or links between sets of them; by default links above "
-                  "20000 patches or where pairs are over the memory limit")
+      .add_option(
+          "--form-factors", chosen.form_factors,
+          "What the operator is made from: pairs of patches, with memory in proportion to "
+          "their number squared, or links between sets of them; by default pairs, and for a "
+          "hierarchical operator links above 20000 patches or where pairs are over the "
+          "memory limit")
       ->check(CLI::IsMember({"pairs", "links"}));
   command
       .add_option(
@@ -310,9 +321,8 @@ void add_form_factor_options(CLI::App& command, PrecomputeOptions& chosen) {
                    "comparison with the reference solution");
   command
       .add_option("--compress-form-factors", chosen.settings.form_factor_tolerance,
-                  "Store the form factors, of pairs or from links, compressed, with this error of "
-                  "the light "
-                  "that is gathered in the mean: for all of that but export")
+                  "Store the form factors, of pairs or from links, compressed: the mean error of "
+                  "gathered light. For all uses of --store-form-factors but export")
       ->check(CLI::Range(1e-5, 0.5));
   command.add_option("--seed", chosen.settings.form_factors.seed, "Seed of the sample points")
       ->capture_default_str();
@@ -372,28 +382,29 @@ void add_output_options(CLI::App& command, PrecomputeOptions& chosen) {
                   "coordinates (TEXCOORD_1)")
       ->check(CLI::Range(kSmallestLightmap, kLargestLightmap));
   command
-      .add_option("--receivers-at", chosen.receivers_at,
-                  "Where light arrives by rows of its own: at patches alone, from which vertices "
-                  "mix theirs; at vertices too, or at texels of the lightmap; or at vertices "
-                  "where-needed: if they are off by more than 10 % without, as in scenes full of "
-                  "small things")
+      .add_option(
+          "--receivers-at", chosen.receivers_at,
+          "Where indirect light is found: at patches alone, from which vertices mix theirs; "
+          "at vertices too; at texels of the lightmap too; or where-needed: at vertices if "
+          "light mixed from patches is off by more than 10 %")
       ->check(CLI::IsMember({kWhereNeeded, "patches", "vertices", "texels"}))
       ->capture_default_str();
   ReceiverRowSettings& rows = chosen.settings.receiver_rows;
   command
       .add_option("--receiver-rays", rows.ray_count,
-                  "Rays of each vertex or texel, with rows of its own")
+                  "Rays of each vertex or texel at which light is found")
       ->check(CLI::Range(64, 1000000))
       ->capture_default_str();
   command
       .add_option("--receiver-tolerance", rows.tolerance,
-                  "Error of the light at vertices or texels at which rows of their own end")
+                  "Error that may remain in the light found at vertices or texels")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   command
       .add_option(
           "--receiver-sets", rows.most_sets,
-          "Sets of patches that a group of 64 vertices or texels sees at most; 9/8 bytes of each")
+          "Most sets of patches for a group of 64 vertices or texels; each set takes 9/8 bytes of "
+          "each of these")
       ->check(CLI::Range(4U, ReceiverRows::kMostSets))
       ->capture_default_str();
   command

@@ -58,7 +58,7 @@ void print_summary(const DrawnFrame& drawn, const RenderOptions& chosen,
         {"lumens", as_json(drawn.flux)},
         {"microseconds", {{"direct", drawn.times.direct}, {"product", drawn.times.product}}}};
     if (!drawn.error.empty()) summary["error_max"] = *std::ranges::max_element(drawn.error);
-    fmt::print("{}\n", summary.dump(2));
+    print_json(summary);
   } else if (!options.quiet) {
     fmt::print("{}: {}x{}, exposure {:+.2f} EV\n{}\n", chosen.output, picture.width, picture.height,
                picture.exposure, described(drawn.camera));

@@ -210,7 +210,7 @@ void print_summary(const SolveOptions& chosen, const SolveReport& report, const 
         {"microseconds", solution.microseconds},
         {"direct_microseconds", report.direct_microseconds},
         {"lumens", as_json(report.flux)}};
-    fmt::print("{}\n", summary.dump(2));
+    print_json(summary);
   } else if (!options.quiet) {
     fmt::print("{}\n", described(report.flux));
     const std::string sweeps =

@@ -117,7 +117,7 @@ void report(const StageTimes& times, int frames, const ChosenCamera& camera,
                                     {"draw", times.draw},
                                     {"card", card}}}};
   if (options.json) {
-    fmt::print("{}\n", summary.dump(2));
+    print_json(summary);
   } else if (!options.quiet) {
     fmt::print(
         "{} frames; median milliseconds: direct {:.2f}, solve {:.2f}, upload {:.2f}, "

@@ -44,8 +44,13 @@ std::vector<double> emissivities(const ViewFactorOptions& chosen, const Facets& 
   const double number = std::strtod(chosen.emissivity.c_str(), &end);
   if (*end == '\0') return std::vector<double>(facets.size(), number);
   std::ifstream file(chosen.emissivity);
-  if (!file) throw Error("cannot read the emissivities of " + chosen.emissivity);
-  return {std::istream_iterator<double>(file), std::istream_iterator<double>()};
+  if (!file) throw Error("cannot read " + chosen.emissivity + "; check --emissivity");
+  std::vector<double> numbers{std::istream_iterator<double>(file), std::istream_iterator<double>()};
+  if (!file.eof()) {
+    throw Error(fmt::format("{}: number {} is none; give one emissivity for each facet",
+                            chosen.emissivity, numbers.size() + 1));
+  }
+  return numbers;
 }
 
 /// What the checks of those who use view factors look at.
@@ -125,7 +130,7 @@ void run(const ViewFactorOptions& chosen, const CommonOptions& options) {
         {"dropped_pairs", dropped.pair_count}, {"dropped_of_row", dropped.largest_row_loss},
         {"seconds", seconds.count()},          {"peak_memory_bytes", peak_memory_bytes()},
     };
-    fmt::print("{}\n", summary.dump(2));
+    print_json(summary);
   } else if (!options.quiet) {
     fmt::print("{} facets, {} view factors, {:.1f} million rays\n", factors.size(),
                factors.factor.size(), static_cast<double>(factors.ray_count) / 1e6);

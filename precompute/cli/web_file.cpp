@@ -2,8 +2,11 @@
 
 #include <zlib.h>
 
+#include <algorithm>
 #include <bit>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
@@ -31,7 +34,12 @@ std::vector<std::byte> gzip(std::span<const std::byte> bytes) {
       Z_OK) {
     throw Error("out of memory while a file is packed");
   }
-  std::vector<std::byte> packed(deflateBound(&stream, bytes.size()));
+  const std::uint64_t most = deflateBound(&stream, bytes.size());
+  if (std::max<std::uint64_t>(most, bytes.size()) > std::numeric_limits<uInt>::max()) {
+    deflateEnd(&stream);
+    throw Error("a file of more than 4 GiB cannot be packed; ask for fewer patches");
+  }
+  std::vector<std::byte> packed(most);
   // It only reads there.
   stream.next_in = const_cast<Bytef*>(reinterpret_cast<const Bytef*>(bytes.data()));
   stream.avail_in = static_cast<uInt>(bytes.size());
@@ -40,7 +48,7 @@ std::vector<std::byte> gzip(std::span<const std::byte> bytes) {
   const int result = deflate(&stream, Z_FINISH);
   packed.resize(stream.total_out);
   deflateEnd(&stream);
-  if (result != Z_STREAM_END) throw Error("a file of more than 4 GiB cannot be packed");
+  if (result != Z_STREAM_END) throw Error("a file could not be packed");
   return packed;
 }
 

@@ -128,8 +128,10 @@ std::shared_ptr<const HierarchicalOperator> MatrixFreeTransfer::compress(
   HierarchicalSettings settings = state.settings.compression;
   settings.tolerance = tolerance;
   const ThreadLimit limited(state.plan.thread_count);
-  const BlockCheckpoint rounds(state.settings.checkpoint,
-                               identity_of_rounds(state.couplings_key, lights, settings));
+  // Parts of a second search have the names of those of the first.
+  std::filesystem::path folder = state.settings.checkpoint;
+  if (!folder.empty() && tolerance != state.settings.compression.tolerance) folder /= "again";
+  const BlockCheckpoint rounds(folder, identity_of_rounds(state.couplings_key, lights, settings));
   return compress_to_tolerance(state.matrix, state.patches, lights, settings, progress, rounds);
 }
 

@@ -77,7 +77,8 @@ SampledError error_over_lights(const std::vector<Replicates>& lights, const Refe
   double squares = 0;
   for (std::size_t k = 0; k < lights.size(); ++k) {
     Replicates relative;
-    relative.add(lights[k], 1 / reference(k));
+    // Nothing is relative to a light that reaches no receiver.
+    if (reference(k) > 0) relative.add(lights[k], 1 / reference(k));
     sum.add(relative, 1 / static_cast<double>(lights.size()));
     squares += relative.all * relative.all / static_cast<double>(lights.size());
     if (relative.all > largest.all) largest = relative;

@@ -1,5 +1,7 @@
 #include "precompute/outputs/light_probes.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -149,8 +151,8 @@ LightProbes place_probes(const DisplayMesh& mesh, const ProbeSettings& settings)
     total *= count[axis];
   }
   if (total > static_cast<double>(kMostProbes)) {
-    throw Error("the grid has " + std::to_string(static_cast<long long>(total)) +
-                " probes, the limit is " + std::to_string(kMostProbes) + "; use a larger spacing");
+    throw Error(fmt::format("the grid has {:.0f} probes, the limit is {}; use a larger spacing",
+                            total, kMostProbes));
   }
   for (int axis = 0; axis < 3; ++axis) {
     probes.grid[axis] = static_cast<std::uint32_t>(count[axis]);
@@ -170,7 +172,9 @@ LightProbes place_probes(const DisplayMesh& mesh, const ProbeSettings& settings)
 void trace_probes(const TransferData& data, std::span<const std::uint32_t> shown_patch,
                   const RayTracer& tracer, const ProbeSettings& settings, LightProbes& probes,
                   const Progress& progress) {
-  if (settings.ray_count < 64) throw Error("light probes: a probe needs at least 64 rays");
+  if (settings.ray_count < kFewestProbeRays) {
+    throw Error("light probes: a probe needs at least 64 rays");
+  }
   probes.valid.clear();
   probes.sky.clear();
   probes.entry_begin = {0};

@@ -398,21 +398,27 @@ class RowBuilder {
 
 }  // namespace
 
+void check_receiver_rows(const ReceiverRowSettings& settings) {
+  if (settings.ray_count < kFewestReceiverRays) {
+    throw Error("rows of receivers: ray_count must be at least 64");
+  }
+  if (!(settings.tolerance >= 0)) {
+    throw Error("rows of receivers: tolerance must be at least 0");
+  }
+  if (settings.most_sets < kSetStep || settings.most_sets > ReceiverRows::kMostSets) {
+    throw Error("rows of receivers: most_sets must be from 4 to 1024");
+  }
+  if (!(settings.least_error >= 0)) {
+    throw Error("rows of receivers: least_error must be at least 0");
+  }
+}
+
 MadeReceiverRows make_receiver_rows(const TransferData& data,
                                     std::span<const std::uint32_t> shown_patch,
                                     const RowReceivers& receivers, const RayTracer& tracer,
                                     const ReceiverRowSettings& settings, std::uint64_t seed,
                                     const Progress& progress) {
-  if (settings.ray_count < kFewestReceiverRays) {
-    throw Error("rows of receivers: a receiver needs at least 64 rays");
-  }
-  if (!(settings.tolerance >= 0) || settings.most_sets < kSetStep ||
-      settings.most_sets > ReceiverRows::kMostSets) {
-    throw Error("rows of receivers: the tolerance must be at least 0, the sets from 4 to 1024");
-  }
-  if (!(settings.least_error >= 0)) {
-    throw Error("rows of receivers: the error from which on there are some must be at least 0");
-  }
+  check_receiver_rows(settings);
   if (!data.transfer) throw Error("rows of receivers need an operator; make one");
   const RowReceivers::Candidates candidates = receivers.candidates();
   if (candidates.receiver.empty()) return {};

@@ -20,6 +20,9 @@ struct MadeReceiverRows {
   std::optional<double> error_without;
 };
 
+/// Throws Error if a setting is out of its range.
+void check_receiver_rows(const ReceiverRowSettings& settings);
+
 /// Finds rows of `receivers` by rays and stores what they add to the reconstruction weights, by
 /// sets of patches (receiver_sets.h); receivers to which they add less than the tolerance get none.
 /// There are none at all if the light without them errs by less than settings.least_error.

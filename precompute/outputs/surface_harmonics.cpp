@@ -15,7 +15,6 @@
 namespace rebounce {
 namespace {
 
-constexpr int kFewestRays = 16;
 constexpr std::size_t kPatchBatch = 256;  // patches between two reports of progress
 
 using PatchView = HarmonicView<kLinearHarmonicCount>;  // the view of one patch
@@ -72,7 +71,7 @@ SurfaceHarmonics trace_surface_harmonics(const TransferData& data,
                                          const RayTracer& tracer,
                                          const SurfaceHarmonicSettings& settings,
                                          const Progress& progress) {
-  if (settings.ray_count < kFewestRays)
+  if (settings.ray_count < kFewestHarmonicRays)
     throw Error("surface harmonics: a patch needs at least 16 rays");
   const std::size_t n = data.patches.size();
   const PatchTriangles triangles(data.mesh.triangle_patch, n);

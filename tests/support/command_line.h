@@ -91,8 +91,8 @@ class CommandLine : public testing::Test {
 
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
 
-  const TemporaryFolder folder_;               // what the program is asked to write
-  const TemporaryFolder printed_{"-printed"};  // what it prints
+  const TemporaryFolder folder_;   // what the program is asked to write
+  const TemporaryFolder printed_;  // what it prints
 };
 
 }  // namespace rebounce::test

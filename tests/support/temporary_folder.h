@@ -1,28 +1,29 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <unistd.h>
+#include <stdlib.h>  // NOLINT(modernize-deprecated-headers): mkdtemp is POSIX
 
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 namespace rebounce::test {
 
-/// A folder of the current test's own, gone when it ends; a test that needs several tells them
-/// apart by `purpose`.
+/// A folder of the current test's own, gone when it ends.
 class TemporaryFolder {
  public:
-  explicit TemporaryFolder(const std::string& purpose = "") {
+  TemporaryFolder() {
     const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-    std::string name = std::string("rebounce-") + info->test_suite_name() + "-" + info->name() +
-                       "-" + std::to_string(::getpid()) + purpose;
+    std::string name =
+        std::string("rebounce-") + info->test_suite_name() + "-" + info->name() + "-XXXXXX";
     std::ranges::replace(name, '/', '_');  // of parameterised tests
-    path_ = std::filesystem::temp_directory_path() / name;
-    std::filesystem::create_directories(path_);
+    std::string path = (std::filesystem::temp_directory_path() / name).string();
+    if (::mkdtemp(path.data()) == nullptr) throw std::runtime_error("cannot make " + path);
+    path_ = path;
   }
   ~TemporaryFolder() {
     std::error_code error;

@@ -13,8 +13,10 @@ namespace rebounce {
 
 /// Runs the offline stage on a glTF scene (.glb or .gltf), and fills `report`. `progress` and
 /// `on_estimate` may be empty. On all of OpenMP's threads; the same bits for any number of them.
-/// save_transfer writes the result. Throws Error if the scene or a setting cannot be used or what
-/// it needs is over the memory limit (before the expensive part), Cancelled if asked to stop.
+/// save_transfer writes the result. Compare its record with the tolerance: a build that misses that
+/// returns all the same. Throws Error if the scene or a setting cannot be used or what it needs is
+/// over the memory limit (before form factors are begun, or once the links are known), Cancelled if
+/// asked to stop.
 std::shared_ptr<const TransferData> build_transfer(const std::filesystem::path& scene_path,
                                                    const BuildSettings& settings,
                                                    BuildReport& report,

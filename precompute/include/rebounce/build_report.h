@@ -13,7 +13,7 @@
 
 namespace rebounce {
 
-/// The size of the correction for closure (closure.h).
+/// The size of the correction that makes rows of F add up (closure).
 struct ClosureReport {
   /// Largest |sum over j of F(i,j) - target| before the correction.
   double row_sum_error_before = 0;
@@ -21,8 +21,8 @@ struct ClosureReport {
   double relative_change = 0;      ///< |S' - S| / |S|, Frobenius
 };
 
-/// Relative area-weighted L2 errors of gathered light, F B. Lights from which nothing arrives
-/// (arrives_nowhere) have no error.
+/// Relative area-weighted L2 errors of gathered light, F B. Lights of which less than a millionth
+/// arrives anywhere have no error.
 struct FormFactorError {
   double mean = 0;
   double max = 0;
@@ -49,8 +49,8 @@ struct WholeError {
 struct CostEstimate {
   std::size_t patch_count = 0;
   std::size_t receiver_count = 0, source_count = 0;
-  std::size_t link_count = 0;  ///< 0: not known yet, or there are none
-  /// As long as links are not known, their number is forecast from a sample.
+  std::size_t link_count = 0;  ///< 0 until links are known, or if there are none
+  /// Of the whole process. As long as links are not known, by a forecast of their number.
   std::uint64_t peak_bytes = 0;
   /// With pairs, what form factors and the dense inverse will take with the threads that there are,
   /// by short samples of either: rough. 0: no sample was taken.
@@ -63,12 +63,16 @@ struct BuildReport {
   std::vector<std::string> mesh_names;  ///< of meshes, or nodes that place one, each once
   std::size_t display_triangle_count = 0;
   std::size_t patch_count = 0;
-  std::size_t sliver_count = 0;
+  std::size_t sliver_count = 0;  ///< triangles thinner than the offset of rays, left out
+  /// Sides of triangles without a patch: those that see no other surface, lie on another surface,
+  /// stop no light, or lie inside of a solid.
   std::size_t unlit_side_count = 0, covered_side_count = 0, opening_side_count = 0,
               buried_side_count = 0;
   float patch_size_min = 0, patch_size_median = 0, patch_size_max = 0;  ///< sqrt(area), metres
   std::vector<std::string> warnings;
   std::vector<std::pair<std::string, double>> seconds;  ///< by phase, in order
+  /// Rays that form factors took, pairs of patches that may see each other, and form factors that
+  /// are not 0.
   std::uint64_t ray_count = 0, pair_count = 0, form_factor_count = 0;
   std::size_t link_count = 0;  ///< that are stored
   ClosureReport closure;
@@ -84,7 +88,8 @@ struct BuildReport {
   std::optional<CostEstimate> estimate_after_links;  ///< of what is left then
 };
 
-/// Called when a phase begins, during it and at its end; returning false stops the build.
+/// Called when a phase begins, during it and at its end; returning false stops the build. It must
+/// not throw: it is called on threads of loops.
 using BuildProgress = std::function<bool(std::string_view phase, double fraction)>;
 
 /// Called once patches are known and before form factors are begun, and where an operator is made

@@ -16,14 +16,14 @@
 namespace rebounce {
 
 struct SubdivisionSettings {
-  /// Wanted number of patches; 0: patch_size decides. More patches resolve finer light; offline
-  /// time and memory grow with their square.
+  /// Wanted number of patches; 0: patch_size decides. More patches resolve finer light; from pairs
+  /// offline memory grows with their square, and time faster.
   std::size_t patch_count = 4096;
-  /// The largest length of a patch, metres; 0: no limit.
+  /// The largest length of a patch, metres, >= 0; 0: no limit. With patch_count both hold.
   float patch_size = 0;
   /// How much finer patches are where the direct light of the scene's own lamps and emitters
   /// varies: a difference of its root mean square over the scene counts like this number of mean
-  /// patch sizes of distance. 0: light has no part in it.
+  /// patch sizes of distance, >= 0. 0: light has no part in it.
   double lamp_weight = 4;  // lab/130
 };
 
@@ -35,15 +35,15 @@ struct FormFactorSettings {
   /// Shadow rays for a pair that is partly hidden, at most 256; a pair that exchanges much light
   /// gets six times as many. More rays make penumbrae smoother and take longer.
   int full_rays = 64;
-  /// Rays per patch into its hemisphere. They measure the light that escapes and the exchange of
-  /// near patches of many triangles, and they find pairs that probe rays misjudge. More rays
-  /// improve row sums in open scenes and reduce noise between near patches.
+  /// Rays per patch into its hemisphere, at least 1. They measure the light that escapes and the
+  /// exchange of near patches of many triangles, and they find pairs that probe rays misjudge. More
+  /// rays improve row sums in open scenes and reduce noise between near patches.
   int hemisphere_rays = 4096;
-  /// Relative error that the unoccluded kernel aims at.
+  /// Relative error that the unoccluded kernel aims at, > 0.
   double kernel_tolerance = 3e-4;
-  /// Only for links (links.h), where it must be above 0: the largest error of a link. It is an
-  /// absolute error, in the Frobenius norm, of the part of A^1/2 F A^-1/2 that the link stands for.
-  /// Smaller values give smaller sets and more links.
+  /// Only for links: the largest error of a link. It is an absolute error, in the Frobenius norm,
+  /// of the part of A^1/2 F A^-1/2 that the link stands for. Smaller values give smaller sets and
+  /// more links. 0: BuildSettings::exchange_source decides.
   double link_epsilon = 0;
 };
 
@@ -67,6 +67,9 @@ enum class FormFactorQuality : std::uint8_t {
 /// | high | 32 | 256 | 65536 | 1e-5 |
 FormFactorSettings with_quality(FormFactorQuality quality, FormFactorSettings settings = {});
 
+/// The fewest rays of a probe, and of a patch with surface harmonics.
+inline constexpr int kFewestProbeRays = 64, kFewestHarmonicRays = 16;
+
 struct ProbeSettings {
   Uint3 grid{0, 0, 0};  ///< probes along x, y and z; zeros: as many as `spacing` gives
   float spacing = 0;    ///< metres between probes; 0: no probes unless `grid` is set
@@ -82,8 +85,8 @@ struct LightmapSettings {
   /// Texels along each side; 0: no lightmap. More texels give sharper light; the file grows by 12
   /// bytes per texel.
   std::uint32_t size = 0;
-  /// Texels by which charts continue beyond their edge. More padding allows more mip levels; charts
-  /// closer to each other share the texels between them.
+  /// Texels by which charts continue beyond their edge, at most 64. More padding allows more mip
+  /// levels; charts closer to each other share the texels between them.
   std::uint32_t padding = 4;
 };
 
@@ -122,18 +125,21 @@ inline constexpr double kDefaultTolerance = 0.005;
 
 /// What the operator is made from.
 enum class ExchangeSource : std::uint8_t {
-  kAutomatic,  ///< links above kPairsPatchCount patches or where pairs are over the memory limit
-  kPairs,      ///< all pairs of patches, up to n² / 4 of them, and a dense inverse
-  kLinks,      ///< links between sets of patches: nothing grows with n²
+  /// Pairs; for a hierarchical operator links above kPairsPatchCount patches, or where pairs are
+  /// over the memory limit.
+  kAutomatic,
+  kPairs,  ///< all pairs of patches, up to n² / 4 of them, and a dense inverse
+  kLinks,  ///< links between sets of patches: nothing grows with n²
 };
 
-/// Above this, memory in proportion to n² is no longer asked for.
+/// Above this, memory in proportion to n² is not asked for.
 inline constexpr std::size_t kPairsPatchCount = 20000;
 
 struct BuildSettings {
   double scale = 1;  ///< metres per unit of the scene file, > 0
   /// The scene's own lamps, in place of those of the asset. Patches are finer where their light
-  /// varies, and the operator is fitted to it.
+  /// varies, and the operator is fitted to it. The data keep those of KHR_lights_punctual, without
+  /// a profile; BuildReport::warnings say how many others there are.
   std::optional<std::vector<Light>> lights;
   SubdivisionSettings subdivision;
   FormFactorSettings form_factors;
@@ -147,10 +153,10 @@ struct BuildSettings {
   ProbeSettings probes;                       ///< by default none
   LightmapSettings lightmap;                  ///< by default none
   SurfaceHarmonicSettings surface_harmonics;  ///< by default none
-  ReceiverRowSettings receiver_rows;          ///< by default none; they need an operator
+  ReceiverRowSettings receiver_rows;          ///< by default where needed; with an operator alone
   OperatorKind operator_kind = OperatorKind::kHierarchical;
   /// Relative area-weighted L2 error that the indirect light of the hierarchical operator may have,
-  /// averaged over lights. Twice the tolerance takes about 0.6 of the bytes.
+  /// in the mean over point lights, > 0. Twice the tolerance takes about 0.6 of the bytes.
   double tolerance = kDefaultTolerance;
   std::size_t rank = 256;  ///< of kLowRank: at least 1
   /// By default kF32 for a dense operator, kQ8 for a hierarchical one, kF16 (half the bytes, an

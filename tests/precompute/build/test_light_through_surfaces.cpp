@@ -244,6 +244,15 @@ TEST(OpacitySampling, MapsAreAsFineAsWhatTheyTell) {
   EXPECT_TRUE(maps.of_triangle(2).empty()) << "the wall is opaque";
 }
 
+TEST(OpacitySampling, WithoutTextureCoordinatesOneTexelDecides) {
+  Scene scene = scene_with_pane(8);
+  make_checker(scene);
+  add_square(scene, 1, 0, true, kPane);
+  scene.base_color_texcoord.assign(scene.position.size(), Float2{0.05F, 0.2F});
+  const OpacityMaps maps = find_opacity_maps(scene);
+  EXPECT_EQ(maps.opacity, std::vector<std::uint8_t>{0});
+}
+
 TEST(OpacitySampling, EqualMapsAreStoredOnce) {
   Scene scene = scene_with_pane();
   make_glass(scene, 0.5F);

@@ -184,9 +184,14 @@ TEST(DenseTransfer, GreyScenesStoreOneMatrix) {
 }
 
 TEST(DenseTransfer, IsForecastForItsArithmeticAndChannels) {
+  const auto seconds = [](std::size_t patches, std::size_t channels, Arithmetic arithmetic) {
+    return forecast_dense_transfer(patches, channels, arithmetic);
+  };
   for (const Arithmetic arithmetic : {Arithmetic::kDouble, Arithmetic::kSingle}) {
-    EXPECT_GT(forecast_dense_transfer(1000, 1, arithmetic), 0);
-    EXPECT_EQ(forecast_dense_transfer(0, 3, arithmetic), 0);
+    EXPECT_EQ(seconds(0, 3, arithmetic), 0);
+    EXPECT_GT(seconds(1000, 1, arithmetic), 0);
+    EXPECT_GT(seconds(4000, 1, arithmetic), 4 * seconds(1000, 1, arithmetic));
+    EXPECT_GT(seconds(4000, 3, arithmetic), 1.5 * seconds(4000, 1, arithmetic));
   }
 }
 

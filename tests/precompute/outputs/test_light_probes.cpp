@@ -141,14 +141,14 @@ TEST(LightProbes, EveryDirectionIsPatchOrSkyOrBack) {
 }
 
 TEST(LightProbes, BehindWallsTheyAreNotValid) {
-  // Probes outside of the one-sided box see backs.
+  // A probe close below the one-sided floor sees its back.
   const TransferData& data = cornell_box();
   const RayTracer tracer = make_surface_tracer(data.mesh);
   LightProbes probes;
   const Float3 middle = data.probes.position[1 + 4 * (1 + 3 * 1)];
-  probes.position = {middle, {middle[0], middle[1] - 10, middle[2]}};
+  probes.position = {middle, {middle[0], -0.02F, middle[2]}};
   trace_probes(data, data.mesh.triangle_patch, tracer, {}, probes);
-  EXPECT_EQ(probes.valid[0], 1);
+  EXPECT_EQ(probes.valid, (std::vector<std::uint8_t>{1, 0}));
 }
 
 TEST(LightProbes, SameBitsForAnyNumberOfThreads) {
@@ -158,11 +158,14 @@ TEST(LightProbes, SameBitsForAnyNumberOfThreads) {
   const int before = omp_get_max_threads();
   omp_set_num_threads(1);
   trace_probes(data, data.mesh.triangle_patch, tracer, {}, probes);
-  const auto one = probes.entry_weight;
+  const LightProbes one = probes;
   omp_set_num_threads(4);
   trace_probes(data, data.mesh.triangle_patch, tracer, {}, probes);
   omp_set_num_threads(before);
-  EXPECT_EQ(one, probes.entry_weight);
+  EXPECT_EQ(one.entry_weight, probes.entry_weight);
+  EXPECT_EQ(one.entry_begin, probes.entry_begin);
+  EXPECT_EQ(one.sky, probes.sky);
+  EXPECT_EQ(one.valid, probes.valid);
 }
 
 TEST(LightProbes, SpacingAndLimits) {

@@ -227,7 +227,7 @@ TEST(ReceiverRows, RefuseWhatCannotBe) {
     const VertexReceivers vertices(from, from.mesh.triangle_patch);
     make_receiver_rows(from, from.mesh.triangle_patch, vertices, tracer, settings, 1);
   };
-  test::expect_error([&] { make(data, {.ray_count = 63}); }, "at least 64 rays");
+  test::expect_error([&] { make(data, {.ray_count = 63}); }, "ray_count must be at least 64");
   test::expect_error([&] { make(data, {.tolerance = -1}); }, "tolerance");
   test::expect_error([&] { make(data, {.tolerance = NAN}); }, "tolerance");
   test::expect_error([&] { make(data, {.least_error = -1}); }, "must be at least 0");
