@@ -90,8 +90,10 @@ def duration(microseconds):
 def readme_line(report):
     """The figures of README: one scene, and the span over all of them."""
     shown = next(
-        h for h in report.headlines if (h.result.scene, h.result.patches) == (SCENE, PATCHES)
+        (h for h in report.headlines if (h.result.scene, h.result.patches) == (SCENE, PATCHES)), None
     )
+    if shown is None:
+        raise SystemExit(f"{report.path} has no {SCENE} of {PATCHES:,} patches; ./dev report --keep writes it anew")
     patches = [h.result.patches for h in report.headlines]
     scenes = {h.result.scene for h in report.headlines}
     switches = [h.switch for h in report.headlines if h.switch is not None]

@@ -56,7 +56,10 @@ def parse_arguments():
         action="store_true",
         help="put the claims into bench/results/, and what they say into notes/ and README.md",
     )
-    return parser.parse_args()
+    options = parser.parse_args()
+    if options.keep and (options.quick or options.only or options.sizes):
+        parser.error("--keep is for the whole report; leave out --quick, --only and --sizes")
+    return options
 
 
 class Job:
@@ -71,14 +74,27 @@ class Job:
         return self.scene.stem
 
 
+def list_scenes(options):
+    """The shipped scenes and those that are named, or these alone; each with a name of its own, by
+    which its results are kept."""
+    scenes = {name: ROOT / f"tests/scenes/{name}.gltf" for name in SCENES}
+    named = [pathlib.Path(scene) for scene in options.scenes]
+    for scene in named:
+        known = scenes.setdefault(scene.stem, scene)
+        if known.resolve() != scene.resolve():
+            raise SystemExit(f"{scene} has the name of {known}, and results are kept by name; rename it")
+    if options.only:
+        scenes = {scene.stem: scene for scene in named}
+    return list(scenes.values())
+
+
 def list_jobs(options, folder):
     """The smallest sizes of all scenes first, so that an early end leaves the most."""
     sizes = QUICK_SIZES if options.quick else SIZES
     if options.sizes:
         sizes = tuple(int(n) for n in options.sizes.split(","))
-    named = [] if options.only else [ROOT / f"tests/scenes/{name}.gltf" for name in SCENES]
-    named += [pathlib.Path(scene) for scene in options.scenes]
-    jobs = [Job(scene, n, folder) for n in sorted(sizes) for scene in named]
+    scenes = list_scenes(options)
+    jobs = [Job(scene, n, folder) for n in sorted(sizes) for scene in scenes]
     if not options.quick and not options.only and not options.sizes:
         jobs += [Job(ROOT / f"tests/scenes/{name}.gltf", n, folder) for name, n in TINY]
     return jobs

@@ -38,7 +38,7 @@ class SweepList {
   void add_gather(const Form& form) {
     const FormFactorOperator& form_factors = *form.form_factors;
     const auto workspace = std::make_shared<std::vector<float>>(form_factors.workspace_size());
-    add(form, "gather", form_factors.bytes(),
+    add(form, "gather", form_factors.bytes_per_gather(),
         [this, &form_factors, workspace] { form_factors.gather(light_, result_, *workspace); });
   }
 

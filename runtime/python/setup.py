@@ -11,6 +11,7 @@ import re
 import shutil
 import subprocess
 import sys
+import sysconfig
 
 from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
@@ -67,7 +68,12 @@ class BuildByCMake(build_ext):
             ["cmake", "--build", build, "--target", "rebounce_python", "--parallel", str(os.cpu_count())],
             check=True,
         )
-        built = next((build / "python" / "rebounce").glob("_core*.so"))
+        built = build / "python" / "rebounce" / f"_core{sysconfig.get_config_var('EXT_SUFFIX')}"
+        if not built.exists():
+            raise SystemExit(
+                f"there is no {built}: {build} was set up for another Python; remove that folder, or "
+                "name another one with REBOUNCE_BUILD_DIR"
+            )
         target = pathlib.Path(self.get_ext_fullpath(extension.name)).resolve()
         shutil.rmtree(target.parent / "lib", ignore_errors=True)
         target.parent.mkdir(parents=True, exist_ok=True)

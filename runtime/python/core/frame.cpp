@@ -49,7 +49,9 @@ SolveMethod solve_method(const std::string& name) {
   for (const NamedSolveMethod& known : kSolveMethods) {
     if (known.name == name) return known.method;
   }
-  throw py::value_error("there is no method \"" + name + "\"");
+  std::string names = "transfer, hierarchical";
+  for (const NamedSolveMethod& known : kSolveMethods) names += ", " + std::string(known.name);
+  throw py::value_error("method must be one of " + names + ", not \"" + name + "\"");
 }
 
 py::tuple solve(const Data& data, const Array<float>& initial_exitance, const std::string& method,
@@ -123,7 +125,6 @@ void add_frame(py::module_& module) {
       .def("estimate_error", &estimate_error, py::arg("engine"));
   module.def("solve", &solve, py::arg("data"), py::arg("initial_exitance"), py::arg("method"),
              py::arg("residual"), py::arg("max_sweeps"));
-  module.def("lights_of_data", [](const Data& data) { return lights_of(data->lights); });
   module.def("cie_sky", [](int type, const Float3& sun_direction, float ground_reflectance) {
     return array_of(cie_sky_of(type, sun_direction, ground_reflectance));
   });

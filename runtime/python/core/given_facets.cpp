@@ -29,7 +29,6 @@ Facets facets_from(const Array<double>& vertices, const Array<std::uint32_t>& be
 
 py::dict arrays_of(ViewFactors factors) {
   py::dict arrays;
-  arrays["patch_count"] = factors.patch_count;
   arrays["ray_count"] = factors.ray_count;
   arrays["indptr"] =
       array_of(std::vector<std::int64_t>(factors.row_begin.begin(), factors.row_begin.end()));

@@ -31,25 +31,53 @@ LightType type_named(const std::string& name) {
   for (const auto& [known, type] : kTypes) {
     if (known == name) return type;
   }
-  throw py::value_error("there is no type \"" + name + "\" of lights");
+  std::string known_names;
+  for (const auto& [known, type] : kTypes) {
+    known_names += (known_names.empty() ? "" : ", ") + std::string(known);
+  }
+  throw py::value_error("type must be one of " + known_names + ", not \"" + name + "\"");
+}
+
+/// What a field must be, in words.
+template <typename Value>
+constexpr std::string_view kWanted = "a number";
+template <>
+constexpr std::string_view kWanted<std::string> = "a string";
+template <>
+constexpr std::string_view kWanted<Float2> = "two numbers";
+template <>
+constexpr std::string_view kWanted<Float3> = "three numbers";
+template <>
+constexpr std::string_view kWanted<std::shared_ptr<IntensityProfile>> =
+    "None or what load_profile returns";
+
+/// A field of a Light or a Sky. Throws ValueError if it is no `Value`.
+template <typename Value>
+Value field(const py::handle& fields, const char* name) {
+  const py::object given = fields.attr(name);
+  try {
+    return given.cast<Value>();
+  } catch (const py::cast_error&) {
+    throw py::value_error(std::string(name) + " must be " + std::string(kWanted<Value>) + ", not " +
+                          py::repr(given).cast<std::string>());
+  }
 }
 
 Light light_from(const py::handle& fields) {
   Light light;
-  light.type = type_named(fields.attr("type").cast<std::string>());
-  light.name = fields.attr("name").cast<std::string>();
-  light.position = fields.attr("position").cast<Float3>();
-  light.direction = fields.attr("direction").cast<Float3>();
-  light.color = fields.attr("color").cast<Float3>();
-  light.intensity = fields.attr("intensity").cast<float>();
-  light.range = fields.attr("range").cast<float>();
-  light.inner_cone_angle = fields.attr("inner_cone_angle").cast<float>();
-  light.outer_cone_angle = fields.attr("outer_cone_angle").cast<float>();
-  light.radius = fields.attr("radius").cast<float>();
-  light.size = fields.attr("size").cast<Float2>();
-  light.tangent = fields.attr("tangent").cast<Float3>();
-  const py::object profile = fields.attr("profile");
-  if (!profile.is_none()) light.profile = profile.cast<std::shared_ptr<IntensityProfile>>();
+  light.type = type_named(field<std::string>(fields, "type"));
+  light.name = field<std::string>(fields, "name");
+  light.position = field<Float3>(fields, "position");
+  light.direction = field<Float3>(fields, "direction");
+  light.color = field<Float3>(fields, "color");
+  light.intensity = field<float>(fields, "intensity");
+  light.range = field<float>(fields, "range");
+  light.inner_cone_angle = field<float>(fields, "inner_cone_angle");
+  light.outer_cone_angle = field<float>(fields, "outer_cone_angle");
+  light.radius = field<float>(fields, "radius");
+  light.size = field<Float2>(fields, "size");
+  light.tangent = field<Float3>(fields, "tangent");
+  light.profile = field<std::shared_ptr<IntensityProfile>>(fields, "profile");
   return light;
 }
 
@@ -95,9 +123,8 @@ std::vector<Light> lights_from(const py::sequence& lights) {
   for (const py::handle& fields : lights) {
     try {
       result.push_back(light_from(fields));
-    } catch (const py::cast_error&) {
-      throw py::value_error("light " + std::to_string(result.size()) +
-                            ": a field is no number, or has the wrong count of them");
+    } catch (const py::value_error& error) {
+      throw py::value_error("light " + std::to_string(result.size()) + ": " + error.what());
     }
   }
   return result;
@@ -130,12 +157,12 @@ py::list lights_of(std::span<const Light> lights) {
 Sky sky_from(const py::object& sky) {
   Sky result;
   if (sky.is_none()) return result;
-  result.color = sky.attr("color").cast<Float3>();
-  result.luminance = sky.attr("luminance").cast<float>();
+  result.color = field<Float3>(sky, "color");
+  result.luminance = field<float>(sky, "luminance");
   const py::object cells = sky.attr("distribution");
   if (cells.is_none()) return result;
   const auto array = Array<float>::ensure(cells);
-  if (!array) throw py::value_error("the distribution of a sky is an array of numbers");
+  if (!array) throw py::value_error("the distribution of a sky must be 146 numbers");
   check_shape(array, {kSkyCellCount}, "the distribution of a sky");
   SkyDistribution distribution;
   std::copy_n(array.data(), kSkyCellCount, distribution.begin());

@@ -109,7 +109,6 @@ BuildSettings settings_of(const py::dict& options) {
     if (name == "tolerance") settings.tolerance = value.cast<double>();
     if (name == "seed") settings.form_factors.seed = value.cast<std::uint64_t>();
     if (name == "operator") settings.operator_kind = operator_kind(value.cast<std::string>());
-    if (name == "precision") settings.precision = precision_named(value.cast<std::string>());
     if (name == "store_form_factors") settings.store_form_factors = value.cast<bool>();
     if (name == "store_links") settings.store_links = value.cast<bool>();
     if (name == "form_factor_tolerance") settings.form_factor_tolerance = value.cast<double>();
@@ -127,7 +126,6 @@ py::dict arrays_of_scene(const py::object& self) {
   arrays["vertices"] = view_of(std::span<const Float3>(scene.position), self);
   arrays["triangles"] = view_of(scene.triangle.empty() ? nullptr : scene.triangle.front().data(),
                                 {static_cast<py::ssize_t>(scene.triangle.size()), 3}, self);
-  arrays["material"] = view_of(std::span<const std::uint32_t>(scene.triangle_material), self);
   return arrays;
 }
 

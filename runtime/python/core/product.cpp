@@ -278,7 +278,7 @@ py::array apply_to_array(const Data& data, const py::array& light, bool adjoint,
     return apply_to<float>(data, light, adjoint, channel);
   }
   const auto doubles = py::array_t<double>::ensure(light);
-  if (!doubles) throw py::value_error("light is an array of numbers");
+  if (!doubles) throw py::value_error("light must be an array of numbers");
   return apply_to<double>(data, doubles, adjoint, channel);
 }
 

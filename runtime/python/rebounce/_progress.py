@@ -58,7 +58,8 @@ class reporting:
     """A context whose value is called with (phase, fraction), or None for silence.
 
     progress: None for a bar on terminals and in notebooks, True or False for one always or never,
-    or a function of one's own, called with the name of the phase and the fraction done in [0, 1].
+    or a function of one's own, called with the name of the phase and the fraction done in [0, 1]; what
+    it raises ends the work, what it returns counts for nothing.
     """
 
     def __init__(self, progress: Progress = None) -> None:

@@ -7,7 +7,7 @@ north -z. All surfaces are diffuse.
 import dataclasses
 import math
 import os
-from typing import Sequence, Tuple, Union
+from typing import List, Sequence, Tuple, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -95,24 +95,39 @@ class Weather:
 
 
 _DAYS_BEFORE = np.cumsum([0, 31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30])
+_MISSING = 9999.0  # W/m²; .epw files have this or more where there is no value
+
+
+def _hour(cells: Sequence[str]) -> Sequence[float]:
+    """Month, day, hour, direct and diffuse irradiance, 0 if missing, out of the five cells of a line."""
+    numbers = [float(cell) for cell in cells]
+    if len(numbers) != 5:
+        raise ValueError("too few columns")
+    if not all(math.isfinite(number) for number in numbers):
+        raise ValueError("a number is not finite")
+    if numbers[0] not in range(1, 13):
+        raise ValueError(f"there is no month {cells[0]}")
+    return numbers[:3] + [0.0 if irradiance >= _MISSING else irradiance for irradiance in numbers[3:]]
 
 
 def _weather(place: str, where: Tuple[float, float, float], rows: Sequence[Sequence[float]]) -> Weather:
     table = np.array(rows, float).reshape(-1, 5)
-    if not len(table):
-        raise ValueError(f"{place}: there are no hours")
     day = _DAYS_BEFORE[table[:, 0].astype(int) - 1] + table[:, 1].astype(int)
     return Weather(place, *where, day, table[:, 2], np.maximum(table[:, 3], 0), np.maximum(table[:, 4], 0))
 
 
 def read_weather(path: Path) -> Weather:
-    """Reads an .epw or a .wea file. Raises ValueError, with the line, if it is neither."""
+    """Reads an .epw file, or a .wea file of weather_data_file_units 1.
+
+    An irradiance of 9999 W/m² or more is a missing value, and taken as 0. Raises ValueError, with file
+    and line, if it is no such file.
+    """
     name = os.fspath(path)
     with open(path, encoding="utf-8", errors="replace") as file:
         lines = file.read().splitlines()
     number = 0
     try:
-        rows = []
+        rows: List[Sequence[float]] = []
         if lines and lines[0].startswith("LOCATION"):
             head = lines[0].split(",")
             place, where = head[1], (float(head[6]), float(head[7]), float(head[8]))
@@ -120,22 +135,27 @@ def read_weather(path: Path) -> Weather:
                 if not line.strip():
                     continue
                 cells = line.split(",")
+                month, day, hour, direct, diffuse = _hour(cells[1:4] + cells[14:16])
                 # Hour k is the hour that ends at k o'clock.
-                rows.append([float(cells[1]), float(cells[2]), float(cells[3]) - 0.5,
-                             float(cells[14]), float(cells[15])])  # fmt: skip
+                rows.append([month, day, hour - 0.5, direct, diffuse])
         elif lines and lines[0].startswith("place"):
             head_of = dict(line.split(None, 1) for line in lines[:6])
             place = head_of["place"]
             # Its longitude and time zone count westwards.
             where = (float(head_of["latitude"]), -float(head_of["longitude"]),
                      -float(head_of["time_zone"]) / 15)  # fmt: skip
+            number = 6
+            if head_of.get("weather_data_file_units", "").strip() != "1":
+                raise ValueError("weather_data_file_units must be 1: direct normal and diffuse horizontal")
             for number, line in enumerate(lines[6:], 7):
                 if line.strip():
-                    rows.append([float(cell) for cell in line.split()[:5]])
+                    rows.append(_hour(line.split()[:5]))
         else:
             raise ValueError("it begins neither with LOCATION, as .epw files do, nor with place, as .wea files do")
     except (IndexError, KeyError, ValueError) as error:
         raise ValueError(f"{name}, line {max(number, 1)}: {error}") from None
+    if not rows:
+        raise ValueError(f"{name} has no hours after its head")
     return _weather(place, where, rows)
 
 
@@ -172,10 +192,12 @@ def perez_sky(
 ) -> Tuple[Floats, Doubles]:
     """The all-weather sky of Perez in the 146 cells that transfer files have.
 
-    to_sun: [h, 3] unit vectors, y up. Irradiances [h] in W/m².
+    to_sun: [h, 3] unit vectors, y up. Irradiances [h] in W/m², at least 0. day_of_year: 1 to 365, a
+    number or [h], for the distance of the sun. ground_reflectance: in [0, 1].
     Returns the mean luminance of the cells, [h, 146] in cd/m² (cell 0: ground of this reflectance
     under sun and sky), and the illuminance of the sun on a surface that faces it, [h] in lx. Hours
-    with the sun less than a degree above the horizon are dark.
+    with the sun less than a degree above the horizon, or without diffuse irradiance, are dark.
+    Raises ValueError if the shapes do not fit each other.
 
     >>> cells, sun = perez_sky([[0, 1, 0]], [0.0], [100.0])
     >>> cells.shape, float(sun[0])
@@ -256,9 +278,9 @@ def _cell_geometry() -> Tuple[Doubles, Doubles]:
 class Year:
     """Illuminances of a year."""
 
-    illuminance: Floats  #: [m, h] lx by sensor and hour, of hours with sun
+    illuminance: Floats  #: [m, h] lx of sun and sky by sensor and hour, of hours with sun
     hours: npt.NDArray[np.int64]  #: [h] their numbers in the weather file, from 0
-    lamps: Floats  #: [m] lx of the lamps alone
+    lamps: Floats  #: [m] lx of the lamps, and of what emits in the scene
 
 
 _LUMINOUS = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec.709
@@ -277,7 +299,11 @@ def simulate_year(
     """The illuminance of every sensor in every hour with sun.
 
     Each hour is a frame: the sun is traced, sun and sky go through the operator. The light of
-    patches goes to the sensors `batch` hours at a time. Lamps are evaluated once, beside.
+    patches goes to the sensors `batch` hours at a time. Lamps, and surfaces that emit, are evaluated
+    once, beside: they are dark in the hours.
+    ground_reflectance: in [0, 1], of the ground below the horizon. points_per_patch: as of Engine.
+    progress: see precompute. Raises Error if the data have no sky cells, because the scene is
+    closed, or a lamp is out of range.
     """
     to_sun = sun_position(weather)
     cells, sun_lux = perez_sky(
@@ -285,6 +311,8 @@ def simulate_year(
     )
     hours = np.flatnonzero(cells[:, 1:].any(axis=1))
     engine = Engine(data, points_per_patch=points_per_patch)
+    for material in range(len(data.record["materials"])):
+        engine.set_emission_scale(material, 0.0)
     result = np.empty((len(sensors), len(hours)), np.float32)
     with reporting(progress) as report:
         for begin in range(0, len(hours), batch):
@@ -301,6 +329,8 @@ def simulate_year(
             result[:, begin : begin + len(part)] = (
                 sensors.patches @ radiosity + np.pi * (sensors.sky_cells @ cells[part].T) + arriving
             )
+    for material in range(len(data.record["materials"])):
+        engine.set_emission_scale(material, 1.0)
     engine.relight(lamps)
     of_lamps = sensors.illuminance(engine, lamps) @ _LUMINOUS
     return Year(result, hours, of_lamps.astype(np.float32))
@@ -309,7 +339,10 @@ def simulate_year(
 def daylight_autonomy(
     year: Year, weather: Weather, threshold: float = 300.0, occupied: Tuple[float, float] = (8.0, 18.0)
 ) -> Doubles:
-    """[m] part of the occupied hours of all days in which a sensor has at least `threshold` lx."""
+    """[m] part of the occupied hours of all days in which a sensor has at least `threshold` lx.
+
+    occupied: from and to, hours of standard time. Raises ValueError if no hour is in between.
+    """
     counted, total = _occupied(year, weather, occupied)
     return np.asarray((year.illuminance[:, counted] >= threshold).sum(axis=1) / total)
 
@@ -321,7 +354,10 @@ def useful_daylight(
     high: float = 3000.0,
     occupied: Tuple[float, float] = (8.0, 18.0),
 ) -> Doubles:
-    """[m] useful daylight illuminance: part of the occupied hours between `low` and `high` lx."""
+    """[m] useful daylight illuminance: part of the occupied hours between `low` and `high` lx.
+
+    occupied: as of daylight_autonomy.
+    """
     counted, total = _occupied(year, weather, occupied)
     light = year.illuminance[:, counted]
     return np.asarray(((light >= low) & (light <= high)).sum(axis=1) / total)

@@ -20,7 +20,7 @@ class ViewFactors(NamedTuple):
     F: "scipy.sparse.csr_matrix"  #: [m, m] of float64
     sky: Doubles  #: [m] fraction of the light of each facet that meets nothing
     blocked: Doubles  #: [m] fraction that meets backs and obstructions
-    area: Doubles  #: [m]
+    area: Doubles  #: [m] in the square of the unit of the vertices
     raw_row_sum: Doubles  #: [m] row sums before the correction
     raw_sky: Doubles  #: [m] the sky by rays, measured apart from the rows
 
@@ -44,6 +44,8 @@ def _corner_lists(facets: Facets) -> Tuple[npt.NDArray[np.uint32], npt.NDArray[n
             raise ValueError(f"facet {number} is no list of whole numbers")
         if index.size and index.min() < 0:
             raise ValueError(f"facet {number} names a vertex below 0")
+        if index.size and int(index.max()) >= 1 << 32:
+            raise ValueError(f"facet {number} names a vertex that is not there: {index.max()}")
         corners.append(index)
         counts.append(index.size)
     joined = np.concatenate(corners) if corners else np.zeros(0)
@@ -60,7 +62,7 @@ def view_factors_report(
     seed: int = 1,
     progress: Progress = None,
 ) -> ViewFactors:
-    """As view_factors(), with all that is known of the rows."""
+    """As view_factors(), with all that is known of the rows. Raises what that does."""
     if quality not in ("low", "default", "high"):
         raise ValueError(f'quality is "low", "default" or "high", not {quality!r}')
     points = np.ascontiguousarray(vertices, dtype=np.float64)
@@ -107,10 +109,12 @@ def view_factors(
     quality: "low", "default" (0.5 % of closed forms) or "high" (0.1 %, ten times as long).
     obstructions: further facets that only stop light, on both sides.
     closed: the facets are an enclosure, whose rows add up to 1.
+    seed: of the rays; every seed gives equally good factors.
     Returns F [m, m], a csr_matrix of float64, and sky [m]. F[i, j] is the fraction of the light of i
     that arrives at j; area[i] F[i, j] = area[j] F[j, i], and rows and sky add up to 1 but for what
     meets backs and obstructions (view_factors_report(...).blocked).
-    Raises Error, with the number of the facet counted from 1, if one cannot be used.
+    Raises ValueError if a shape does not fit, Error, with the number of the facet counted from 1, if
+    one cannot be used.
 
     >>> from rebounce import view_factors
     >>> square = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
@@ -137,11 +141,14 @@ def exchange_factors(
 
     emissivity: in [0.01, 1], a number or [m].
     Returns G [m, m]: the fraction of what i emits that j absorbs after all reflections, and [m] the
-    fraction that leaves in the end. Memory grows with m², time with m³.
+    fraction that leaves in the end. Memory grows with m², time with m³. Raises ValueError if a shape
+    does not fit, Error if a number is out of range.
     """
     matrix = scipy.sparse.csr_matrix(F)
     matrix.sort_indices()
     count = matrix.shape[0]
+    if matrix.shape != (count, count):
+        raise ValueError(f"F has the shape {list(matrix.shape)}, and needs [{count}, {count}]")
     arrays = []
     for name, values in (("sky", sky), ("area", area), ("emissivity", emissivity)):
         array = np.asarray(values, dtype=np.float64)
@@ -162,7 +169,8 @@ def exchange_factors(
 
 
 def read_facets(path: Union[str, "os.PathLike[str]"]) -> Tuple[Doubles, Any, Any]:
-    """The facets of an .stl, .obj or .vs3 file: vertices [v, 3], facets and obstructions as lists."""
+    """The facets of an .stl, .obj or .vs3 file: vertices [v, 3], facets and obstructions as lists of
+    indices from 0. Raises Error, with the line, if the file cannot be used."""
     points, begin, corners, obstructs, _ = _core.read_facets(os.fspath(path))
     lists = [part.tolist() for part in np.split(corners, begin[1:-1])]
     only = obstructs if len(obstructs) else np.zeros(len(lists), np.uint8)

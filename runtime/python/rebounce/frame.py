@@ -23,10 +23,11 @@ class Light:
 
     type: "point", "spot", "directional", "sphere", "rectangle" or "disc".
     position: metres. direction: the way the light travels, of unit length.
-    color: linear Rec.709. intensity: candela (point, spot), lux (directional), cd/m² (surfaces).
-    range: metres, 0 for none. Cone angles in radians. radius, size: metres, of surfaces.
-    profile: of a luminaire, from load_profile; `intensity` is then a factor of its candelas, and
-    `tangent` the way of its horizontal angle 0.
+    color: linear Rec.709, >= 0. intensity: >= 0; candela (point, spot), lux (directional), cd/m²
+    (surfaces). range: metres, 0 for none. Cone angles: radians, inner <= outer <= pi / 2.
+    radius: metres, > 0, of spheres and discs. size: metres, > 0, of rectangles, along `tangent` and
+    across it. profile: of a luminaire, from load_profile; `intensity` is then a factor of its
+    candelas, and `tangent` the way of its horizontal angle 0.
     """
 
     type: str = "point"
@@ -48,8 +49,8 @@ class Light:
 class Sky:
     """What is seen where nothing is hit.
 
-    luminance: cd/m². color: linear Rec.709.
-    distribution: [146] the luminance of each cell in parts of `luminance`, or None for the same in
+    luminance: cd/m², >= 0. color: linear Rec.709, >= 0.
+    distribution: [146], >= 0, the luminance of each cell in parts of `luminance`, or None for the same in
     all directions. Cell 0 is all that is below the horizon, 1 to 145 are Tregenza's.
     """
 
@@ -61,13 +62,15 @@ class Sky:
 def cie_sky(kind: int, sun_direction: Triple, ground_reflectance: float = 0.2) -> Floats:
     """[146] the CIE standard general sky number `kind`, 1 to 15, in parts of the zenith's luminance.
 
-    sun_direction: the way that sunlight travels. Raises Error if an argument is out of range.
+    sun_direction: the way that sunlight travels, of any length but 0. ground_reflectance: in [0, 1].
+    Raises Error if an argument is out of range.
     """
     return _core.cie_sky(kind, [float(x) for x in sun_direction], ground_reflectance)
 
 
 def sky_cell_directions(per_side: int = 4) -> Tuple[Floats, npt.NDArray[np.uint32]]:
-    """Unit directions spread evenly over the 145 cells above the horizon: [145 k², 3] and their cells."""
+    """Unit directions spread evenly over the 145 cells above the horizon, per_side² in each:
+    [145 per_side², 3], and their cells [145 per_side²]."""
     places = [(a + 0.5) / per_side for a in range(per_side)]
     points = [
         _core.point_of_sky_cell(cell, (a, b)) for cell in range(1, 146) for a in places for b in places
@@ -79,7 +82,8 @@ def sky_cell_directions(per_side: int = 4) -> Tuple[Floats, npt.NDArray[np.uint3
 def load_profile(path: Union[str, "os.PathLike[str]"]) -> "_core.Profile":
     """The light distribution of a luminaire from an IES file (LM-63, type C), for Light.profile.
 
-    Raises Error if the file is no such file.
+    Its `vertical` and `horizontal` angles are in radians; `intensity(vertical, horizontal)` gives
+    candela. Raises Error if the file is no such file.
     """
     with open(path, encoding="latin-1") as file:
         return _core.parse_profile(file.read(), os.fspath(path))
@@ -106,6 +110,9 @@ class Engine:
 
     One light state, for one thread at a time. Results are views of the last frame, [n, 3] in lx:
     copy what is to outlive the next one.
+    points_per_patch: at which lamps are looked at, at least 1. area_light_samples: places of a lamp
+    with a surface that each point looks at, 1 to 64. More of either: truer shadows, longer frames.
+    Raises Error if one is out of range.
     """
 
     def __init__(
@@ -117,17 +124,20 @@ class Engine:
         self._materials: List[str] = data.record["materials"]
 
     def relight(self, lights: Sequence[Light] = (), sky: Optional[Sky] = None) -> None:
-        """One frame. Raises Error, with the number of the light, if a field is out of range."""
+        """One frame. Raises ValueError if a field has no such value, Error, with the number of the
+        light, if it is out of range; the last frame then stays."""
         self._core.relight(list(lights), sky)
 
     def relight_by_direct(self, direct_irradiance: npt.ArrayLike) -> None:
-        """One frame with the direct irradiance [n, 3] in lx of the caller."""
+        """One frame with the direct irradiance [n, 3] in lx of the caller. Raises ValueError for
+        another shape, Error if a number is negative or not finite; the last frame then stays."""
         self._core.relight_by_direct(np.ascontiguousarray(direct_irradiance, dtype=np.float32))
 
     def set_emission_scale(self, material: Union[int, str], scale: Union[float, Triple]) -> None:
         """From the next frame on, a material emits `scale` times what the scene says.
 
-        material: its number, or its name. Raises ValueError if there is no such name.
+        material: its number, or its name. scale: a number or [3], >= 0. Raises ValueError if there is
+        no such name, Error if there is no such number or a scale is out of range.
         """
         if isinstance(material, str):
             named = [m for m, name in enumerate(self._materials) if name == material]
@@ -173,14 +183,14 @@ class Engine:
 
 @dataclasses.dataclass
 class Solution:
-    """What solve() gives: radiosity [n, 3] in lx, and how it was found."""
+    """What solve() gives."""
 
-    radiosity: Floats
-    sweeps: int
-    residual: float
-    converged: bool
-    diverged: bool
-    microseconds: float
+    radiosity: Floats  #: [n, 3] lx
+    sweeps: int  #: 0 of the product
+    residual: float  #: |M0 + rho F B - B| / |M0|; nan of the product
+    converged: bool  #: the residual that was asked for is reached; True of the product
+    diverged: bool  #: the residual grew; the best solution is given
+    microseconds: float  #: of the sweeps; nan of the product
 
 
 def solve(
@@ -195,7 +205,9 @@ def solve(
     method: "transfer", the product with the operator, or an iteration with the form factors that the
     data keep: "gathering", "jacobi", "gauss-seidel", "symmetric-gauss-seidel",
     "conjugate-gradient", "refine" (from the operator's solution), or "hierarchical" (with links).
-    It stops at the relative `residual` or after `max_sweeps`.
+    It stops at the relative `residual` (0: never) or after `max_sweeps`, at least 1. Raises
+    ValueError for another shape or method, Error if the data lack the form factors it needs or a
+    number is out of range.
     """
     exitance = np.ascontiguousarray(initial_exitance, dtype=np.float32)
     if exitance.shape != (data.patch_count, 3):

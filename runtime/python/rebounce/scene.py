@@ -1,7 +1,7 @@
 """Scenes: triangles with reflectances and emission."""
 
 import os
-from typing import List, Optional, Union
+from typing import Any, List, Optional, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +35,8 @@ class Scene:
     ids: [t] a whole number for each triangle, that TransferData.patch_ids gives back by patch;
         triangles of different ids share no material. By default 0.
     double_sided: both sides of all triangles reflect and emit.
+    name: what messages and records call it.
+    Raises ValueError if a shape does not fit or a number is out of range.
     """
 
     def __init__(
@@ -53,6 +55,8 @@ class Scene:
             raise ValueError(f"vertices have the shape {list(points.shape)}, and need [v, 3]")
         if corners.ndim != 2 or corners.shape[1] != 3:
             raise ValueError(f"triangles have the shape {list(corners.shape)}, and need [t, 3]")
+        if corners.size and corners.dtype.kind not in "iu":
+            raise ValueError("triangles must be whole numbers, indices of vertices")
         if not np.isfinite(points).all():
             raise ValueError("vertices are not all finite")
         if corners.size and (corners.min() < 0 or corners.max() >= len(points)):
@@ -64,10 +68,14 @@ class Scene:
             raise ValueError("reflectance is not in [0, 0.99] everywhere")
         if not ((luminance >= 0) & np.isfinite(luminance)).all():
             raise ValueError("emission is negative or not finite somewhere")
-        numbers = np.zeros(count, np.int64) if ids is None else np.asarray(ids, dtype=np.int64)
-        if numbers.shape != (count,):
-            raise ValueError(f"ids have the shape {list(numbers.shape)}, and need [{count}]")
-        rows = np.column_stack([numbers.astype(np.float64), rho, luminance])
+        given: npt.NDArray[Any] = np.zeros(count, np.int64) if ids is None else np.asarray(ids)
+        if given.shape != (count,):
+            raise ValueError(f"ids have the shape {list(given.shape)}, and need [{count}]")
+        if given.size and (given.dtype.kind not in "iu" or int(given.max()) >= 1 << 63):
+            raise ValueError("ids must be whole numbers below 2^63")
+        numbers = given.astype(np.int64)
+        # Ranks in place of ids: float64 does not hold every id.
+        rows = np.column_stack([np.unique(numbers, return_inverse=True)[1], rho, luminance])
         kinds, first, group = np.unique(rows, axis=0, return_index=True, return_inverse=True)
         self._ids: Optional[npt.NDArray[np.int64]] = numbers[first]
         self._core = _core.Scene(
@@ -93,7 +101,8 @@ class Scene:
 
     @property
     def vertices(self) -> Floats:
-        """[v, 3] metres; a view."""
+        """[v, 3] metres; a view. Not those that were given: each triangle has its own, and triangles
+        without area are left out."""
         return self._core.arrays()["vertices"]
 
     @property
@@ -116,7 +125,7 @@ class Scene:
 
 
 def load_scene(path: Union[str, "os.PathLike[str]"], scale: float = 1.0) -> Scene:
-    """Reads a .glb or .gltf file; `scale` is the length of its unit in metres.
+    """Reads a .glb or .gltf file; `scale` is the length of its unit in metres, above 0.
 
     Raises Error, one line, if the file cannot be used.
     """

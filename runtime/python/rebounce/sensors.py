@@ -21,9 +21,10 @@ class Sensors:
     """Light meters of a scene: linear maps from its light to the illuminance at points.
 
     positions: [m, 3] metres. normals: [m, 3], of any length but 0.
-    rays: of each sensor; the noise falls with their number.
+    rays: of each sensor, at least 1; the noise falls with their number.
     `patches` [m, n] is a csr_matrix and `sky_cells` [m, 146] an array: with radiosity B [n, 3] in lx
     and luminances L [146] in cd/m² the illuminance without lamps is patches @ B + pi sky_cells @ L.
+    Raises ValueError if a shape does not fit or a normal has no length.
     """
 
     def __init__(
@@ -59,7 +60,8 @@ class Sensors:
         return int(self.sky_cells.shape[0])
 
     def direct(self, lights: Sequence[Light], samples: int = 16) -> Floats:
-        """[m, 3] lx straight from lamps, with shadows; a lamp with a surface has `samples` places."""
+        """[m, 3] lx straight from lamps, with shadows; a lamp with a surface has `samples` places, at
+        least 1."""
         return self._core.direct(list(lights), samples)
 
     def illuminance(
@@ -75,7 +77,8 @@ class Sensors:
 
 
 def read_points(path: Union[str, "os.PathLike[str]"]) -> Tuple[Floats, Floats]:
-    """The sensors of a .pts file, `x y z dx dy dz` a line with z up: positions and normals, y up."""
+    """The sensors of a .pts file, `x y z dx dy dz` a line with z up: positions and normals, y up.
+    Raises ValueError if a line has not six numbers."""
     rows = np.loadtxt(path, ndmin=2)
     if rows.shape[1] != 6:
         raise ValueError(f"{os.fspath(path)}: lines have {rows.shape[1]} numbers, and need 6")

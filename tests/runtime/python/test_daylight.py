@@ -22,10 +22,11 @@ def test_weather_files(tmp_path):
     assert (weather.latitude, weather.longitude, weather.time_zone) == (52.5, 13.4, 1)
     assert list(weather.day_of_year) == [1, 172] and list(weather.hour) == [0.5, 12.5]
     wea = tmp_path / "a.wea"
-    wea.write_text(
+    wea_head = (
         "place Somewhere\nlatitude 52.5\nlongitude -13.4\ntime_zone -15\nsite_elevation 49\n"
-        "weather_data_file_units 1\n1 1 0.5 0 0\n6 21 12.5 700 120\n"
+        "weather_data_file_units 1\n"
     )
+    wea.write_text(wea_head + "1 1 0.5 0 0\n6 21 12.5 700 120\n")
     again = daylight.read_weather(wea)
     for name in ("latitude", "longitude", "time_zone"):
         assert getattr(again, name) == getattr(weather, name)
@@ -36,6 +37,25 @@ def test_weather_files(tmp_path):
     epw.write_text(EPW_HEAD + "2020,1,1,x\n")
     with pytest.raises(ValueError, match="line 9"):
         daylight.read_weather(epw)
+    epw.write_text(EPW_HEAD + epw_line(13, 1, 1, 0, 0))
+    with pytest.raises(ValueError, match="a.epw, line 9: there is no month 13"):
+        daylight.read_weather(epw)
+    epw.write_text(EPW_HEAD)
+    with pytest.raises(ValueError, match="a.epw has no hours"):
+        daylight.read_weather(epw)
+    wea.write_text(wea_head + "1 1 0.5 0\n")
+    with pytest.raises(ValueError, match="a.wea, line 7: too few columns"):
+        daylight.read_weather(wea)
+    wea.write_text(wea_head.replace("units 1", "units 2") + "1 1 0.5 0 0\n")
+    with pytest.raises(ValueError, match="a.wea, line 6: weather_data_file_units must be 1"):
+        daylight.read_weather(wea)
+    epw.write_text(EPW_HEAD + epw_line(6, 21, 12, 9999, 99999.0) + epw_line(6, 21, 13, 9998, 120))
+    weather = daylight.read_weather(epw)
+    assert list(weather.direct_normal) == [0, 9998] and list(weather.diffuse_horizontal) == [0, 120]
+    for cell in ("nan", "inf"):
+        epw.write_text(EPW_HEAD + epw_line(6, 21, 12, 700, cell))
+        with pytest.raises(ValueError, match="a.epw, line 9: a number is not finite"):
+            daylight.read_weather(epw)
 
 
 def noon(day, latitude):
@@ -111,3 +131,21 @@ def test_a_year_in_the_open(tmp_path):
     for name in ("a.npy", "a.ill"):
         daylight.write_illuminance(tmp_path / name, year)
     assert np.allclose(np.load(tmp_path / "a.npy"), np.loadtxt(tmp_path / "a.ill"), rtol=1e-5)
+
+
+def test_what_emits_is_of_the_lamps_and_not_of_the_day():
+    vertices = [[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]]
+    lid = [[x, 1.0, z] for x, _, z in vertices]
+    triangles = [[0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7]]
+    weather = noon(172, 40.0)
+    years = []
+    for luminance in (0.0, 1000.0):
+        emission = np.repeat([0.0, luminance], 2)
+        scene = rebounce.Scene(vertices + lid, triangles, 0.5, emission[:, None])
+        data = rebounce.precompute(scene, patches=16, quality="low", progress=False)
+        sensors = rebounce.Sensors(data, [[0.0, 0.1, 0.0]], [[0.0, 1.0, 0.0]], rays=2000)
+        years.append(daylight.simulate_year(data, sensors, weather, progress=False))
+    dark, lit = years
+    assert dark.illuminance[0, 0] > 100
+    assert np.allclose(lit.illuminance, dark.illuminance, rtol=1e-2)
+    assert dark.lamps[0] == 0 and lit.lamps[0] > 100

@@ -63,12 +63,16 @@ def test_wrong_facets_are_refused():
         rebounce.view_factors(vertices, [[0.5, 1, 2]])
     with pytest.raises(ValueError, match="below 0"):
         rebounce.view_factors(vertices, [[-1, 1, 2]])
+    with pytest.raises(ValueError, match="facet 0 names a vertex that is not there: 4294967296"):
+        rebounce.view_factors(vertices, [[1 << 32, 1, 2]])
     with pytest.raises(ValueError, match="quality"):
         rebounce.view_factors(vertices, [[0, 1, 2]], "best")
     with pytest.raises(rebounce.Error, match="facet 1 names vertex 4 of 3"):
         rebounce.view_factors(vertices, [[0, 1, 3]])
     with pytest.raises(rebounce.Error, match="no enclosure"):
         rebounce.view_factors(vertices, [[0, 1, 2]], closed=True)
+    with pytest.raises(ValueError, match=r"F has the shape \[2, 3\], and needs \[2, 2\]"):
+        rebounce.exchange_factors(np.ones((2, 3)), 0.0, 1.0, 0.5)
 
 
 def test_files_of_facets(tmp_path):
