@@ -100,7 +100,8 @@ export class SurfaceFitter {
     for (const { start, count, materialIndex } of groups) {
       const bothSides = materials[materialIndex]?.side === THREE.DoubleSide;
       made.beginGroup(materialIndex);
-      for (let k = start; k + 3 <= start + count; k += 3) {
+      const end = Math.min(start + count, (index ?? place).count);
+      for (let k = start; k + 3 <= end; k += 3) {
         const corners = [0, 1, 2].map((c) => (index ? index.getX(k + c) : k + c));
         const [a, b, c] = corners.map(
             (v) => new THREE.Vector3().fromBufferAttribute(place, v).applyMatrix4(matrixWorld));

@@ -11,7 +11,7 @@ export class RebounceError extends Error {
 }
 
 let compiled = null;  // promise of a module
-let shared = null;    // promise of the instance that all files live in
+let shared = null;    // promise of the instance that all files live in; null while there is none
 
 /** Whether this browser can run the module: SIMD and exceptions of WebAssembly. */
 export function isSupported() {
@@ -41,17 +41,20 @@ export class Instance {
   #decoder = new TextDecoder();
   broken = false;
 
-  /** @returns {Promise<Instance>} the shared one, or a new one after that broke */
-  static async get() {
-    const now = await shared;
-    if (now && !now.broken) return now;
-    compiled ??= compile();
-    shared = compiled.then(async (module) => {
-      const instance = new Instance();
-      await instance.#start(module);
-      return instance;
+  /** @returns {Promise<Instance>} the shared one, or a new one after that broke or did not start */
+  static get() {
+    shared ??= Instance.#make().catch((error) => {
+      compiled = shared = null;
+      throw error;
     });
     return shared;
+  }
+
+  static async #make() {
+    compiled ??= compile();
+    const instance = new Instance();
+    await instance.#start(await compiled);
+    return instance;
   }
 
   async #start(module) {
@@ -78,6 +81,7 @@ export class Instance {
       return this.#exports[name](...args);
     } catch (error) {
       this.broken = true;
+      shared = null;
       throw new RebounceError(`the module has stopped (${error.message}); load the file again`);
     }
   }
@@ -103,6 +107,9 @@ export class Instance {
     const address = this.allocate(bytes.byteLength);
     new Uint8Array(this.#exports.memory.buffer, address, bytes.byteLength).set(bytes);
     return address;
+  }
+  putTriple(numbers) {
+    return this.put(new Uint8Array(new Float32Array(numbers).buffer));
   }
   putText(text) {
     return this.put(this.#encoder.encode(`${text}\0`));

@@ -1,4 +1,7 @@
-/** A lamp or the sun, in the fields, units and defaults of a light file (KHR_lights_punctual). */
+/**
+ * A lamp or the sun, in the fields, units and defaults of a light file (KHR_lights_punctual). All
+ * vectors and colours, here and elsewhere, are three numbers.
+ */
 export interface Light {
   type?: 'point' | 'spot' | 'directional' | 'sphere' | 'rectangle' | 'disc';
   /** m */
@@ -130,10 +133,14 @@ export class Transfer {
   createEngine(settings?: EngineSettings): Engine;
   /** Loads the file of form factors that `precompute --for web` wrote beside this one. */
   loadSolver(source: string | URL | ArrayBuffer, options?: LoadOptions): Promise<Solver>;
+  /** Frees the file's memory, when its engines have been disposed of too; it makes no more of them. */
   dispose(): void;
 }
 
-/** One state of the light of a scene. Results are views that change with the next frame. */
+/**
+ * One state of the light of a scene. Results are views that change with the next frame, each in a
+ * place of its own, and may end when a file is loaded.
+ */
 export class Engine {
   private constructor();
   readonly patchCount: number;
@@ -164,14 +171,15 @@ export class Engine {
   vertexIrradiance(): Float32Array;
   vertexDirectIrradiance(): Float32Array;
   /**
-   * [vertexCount][3], lx: straight from the sky and those lights that are chosen, [lights] of 0 and
-   * 1; to be called at most once after each frame.
+   * [vertexCount][3], lx: straight from the sky and those lights that are chosen, 0 or 1 for each
+   * light of the frame; to be called at most once after each frame.
    */
   vertexDirectIrradianceOf(chosen: ArrayLike<number>): Float32Array;
   /** The same at patches, [patchCount][3], of the last call of vertexDirectIrradianceOf. */
   chosenDirectIrradiance(): Float32Array;
   /** [probeCount][9][3], cd/m²: spherical harmonics of degree 0 to 2. */
   probeLight(): Float32Array;
+  /** Frees the engine's memory; all other calls throw RebounceError then. */
   dispose(): void;
 }
 
@@ -197,5 +205,6 @@ export class Solver {
   sweep(engine: Engine, count: number): Swept;
   /** [vertexCount][3], lx: the bounced light of the last sweeps. */
   vertexIrradiance(): Float32Array;
+  /** Frees the solver's memory; all other calls throw RebounceError then. */
   dispose(): void;
 }

@@ -1,7 +1,7 @@
 // Rebounce in the browser: loads transfer files and relights their scenes.
 
 import { Instance, RebounceError, isSupported } from './instance.js';
-import { plainLightSize, writeLight } from './plain_light.js';
+import { plainLightSize, triple, writeLight } from './plain_light.js';
 import { readSafetensors } from './safetensors.js';
 
 export { RebounceError, isSupported };
@@ -53,6 +53,12 @@ async function bytesOf(source, { onProgress = () => {}, name } = {}) {
   return { buffer, title };
 }
 
+/** The address of what is there: 0 is that of what has been disposed of. */
+function living(address, title, remedy) {
+  if (address === 0) throw new RebounceError(`${title} has been disposed of; ${remedy}`);
+  return address;
+}
+
 /** All that a transfer file holds. */
 export class Transfer {
   #instance;
@@ -90,18 +96,25 @@ export class Transfer {
     this.errorMean = Number(file.metadata.error_mean);
   }
 
+  #living() {
+    return living(this.#address, this.name, 'load it again');
+  }
+
   /** Makes an engine: one state of the light of this scene. */
   createEngine(settings) {
-    return new Engine(this.#instance, this.#address, this, settings);
+    return new Engine(this.#instance, this.#living(), this, settings);
   }
 
   /** Loads the form factors that were written with this file, for Gauss-Seidel. */
   async loadSolver(source, options) {
     const { buffer, title } = await bytesOf(source, options);
-    return new Solver(this.#instance, this.#address, this, buffer, title);
+    return new Solver(this.#instance, this.#living(), this, buffer, title);
   }
 
-  /** Frees the file's memory, when its engines have been disposed of too. */
+  /**
+   * Frees the file's memory, when its engines have been disposed of too. The file makes no engine
+   * and no solver then.
+   */
   dispose() {
     if (this.#address && !this.#instance.broken) {
       this.#instance.call('rebounce_transfer_release', this.#address);
@@ -114,17 +127,20 @@ export class Transfer {
 export class Engine {
   #instance;
   #address;
+  #file;  // what messages call it
   #lights = { address: 0, capacity: 0 };
+  #lightCount = 0;  // of the last frame
   #sky;
   #milliseconds;
-  #vertices;
+  #vertices;  // addresses, one for each of the results at vertices
   #patches;
   #chosen;
   #probes;
 
-  constructor(instance, transfer, { patchCount, mesh, probes },
+  constructor(instance, transfer, { name, patchCount, mesh, probes },
               { pointsPerPatch = 8, areaLightSamples = 4, lightCapacity = 16 } = {}) {
     this.#instance = instance;
+    this.#file = name;
     this.patchCount = patchCount;
     this.vertexCount = mesh.position.length / 3;
     /** Milliseconds of the stages of the last frame. */
@@ -141,16 +157,21 @@ export class Engine {
     }
     this.#sky = instance.allocate(4 * 4);
     this.#milliseconds = instance.allocate(8 * stages.length);
-    this.#vertices = instance.allocate(12 * this.vertexCount);
+    const atVertices = () => instance.allocate(12 * this.vertexCount);
+    this.#vertices = { bounced: atVertices(), direct: atVertices(), chosen: atVertices() };
     this.#patches = instance.allocate(12 * patchCount);
     this.probeCount = probes?.valid.length ?? 0;
     this.#probes = instance.allocate(4 * probeFloats * this.probeCount + 1);
     this.#makeRoom(lightCapacity);
   }
 
+  #living() {
+    return living(this.#address, `the engine of ${this.#file}`, 'make another with createEngine()');
+  }
+
   /** For the solver. */
   get address() {
-    return this.#address;
+    return this.#living();
   }
 
   #makeRoom(count) {
@@ -167,11 +188,14 @@ export class Engine {
 
   /** One frame: all that follows from `lights` and `sky`. */
   relight(lights, sky = {}) {
+    const address = this.#living();
     this.#makeRoom(lights.length);
     const plain = this.#instance.floats(this.#lights.address, plainLightSize * lights.length);
-    lights.forEach((light, k) => writeLight(light, plain, k * plainLightSize));
-    this.#instance.floats(this.#sky, 4).set([...(sky.color ?? [1, 1, 1]), sky.luminance ?? 0]);
-    this.#instance.check('rebounce_web_relight', this.#address, this.#lights.address, lights.length,
+    lights.forEach((light, k) => writeLight(light, plain, k));
+    const color = triple(sky.color ?? [1, 1, 1], 'sky: color');
+    this.#instance.floats(this.#sky, 4).set([...color, sky.luminance ?? 0]);
+    this.#lightCount = lights.length;
+    this.#instance.check('rebounce_web_relight', address, this.#lights.address, lights.length,
                          this.#sky, this.#milliseconds);
     const [direct, before, product, after] =
         this.#instance.doubles(this.#milliseconds, stages.length);
@@ -181,12 +205,13 @@ export class Engine {
 
   /** From the next frame on, the sky looks as the CIE's sky of this type, times its luminance. */
   setSky(type, sunDirection, groundReflectance = 0.2) {
+    const address = this.#living();
     const instance = this.#instance;
-    const sun = instance.put(new Uint8Array(new Float32Array(sunDirection).buffer));
+    const sun = instance.putTriple(triple(sunDirection, 'setSky: sunDirection'));
     const cells = instance.allocate(4 * skyCellCount);
     try {
       instance.check('rebounce_cie_sky', type, sun, groundReflectance, cells);
-      instance.check('rebounce_engine_set_sky_distribution', this.#address, cells);
+      instance.check('rebounce_engine_set_sky_distribution', address, cells);
     } finally {
       instance.release(sun);
       instance.release(cells);
@@ -198,8 +223,9 @@ export class Engine {
    * up, columns from -x over +z and +x to -z.
    */
   skyPanorama(type, sunDirection, width, height, groundReflectance = 0.2) {
+    this.#living();
     const instance = this.#instance;
-    const sun = instance.put(new Uint8Array(new Float32Array(sunDirection).buffer));
+    const sun = instance.putTriple(triple(sunDirection, 'skyPanorama: sunDirection'));
     const cells = instance.allocate(4 * skyCellCount);
     const texels = instance.allocate(4 * width * height);
     try {
@@ -214,15 +240,16 @@ export class Engine {
 
   /** From the next frame on, the sky is uniform. */
   setUniformSky() {
-    this.#instance.check('rebounce_engine_set_sky_distribution', this.#address, 0);
+    this.#instance.check('rebounce_engine_set_sky_distribution', this.#living(), 0);
   }
 
   /** From the next frame on, the sky is uniform, and what is below the horizon `ground` times it. */
   setSkyAboveGround(ground) {
+    const address = this.#living();
     const cells = this.#instance.put(new Uint8Array(
         new Float32Array(skyCellCount).fill(1).fill(ground, 0, 1).buffer));
     try {
-      this.#instance.check('rebounce_engine_set_sky_distribution', this.#address, cells);
+      this.#instance.check('rebounce_engine_set_sky_distribution', address, cells);
     } finally {
       this.#instance.release(cells);
     }
@@ -230,16 +257,17 @@ export class Engine {
 
   /** From the next frame on, the surfaces of a material emit that of the scene times `scale`. */
   setEmissionScale(material, scale) {
-    const address = this.#instance.put(new Uint8Array(new Float32Array(scale).buffer));
+    const address = this.#living();
+    const factors = this.#instance.putTriple(triple(scale, 'setEmissionScale: scale'));
     try {
-      this.#instance.check('rebounce_engine_set_emission_scale', this.#address, material, address);
+      this.#instance.check('rebounce_engine_set_emission_scale', address, material, factors);
     } finally {
-      this.#instance.release(address);
+      this.#instance.release(factors);
     }
   }
 
   #result(name) {
-    return this.#instance.floats(this.#instance.call(name, this.#address), 3 * this.patchCount);
+    return this.#instance.floats(this.#instance.call(name, this.#living()), 3 * this.patchCount);
   }
   directIrradiance() {
     return this.#result('rebounce_engine_direct_irradiance');
@@ -251,17 +279,17 @@ export class Engine {
     return this.#result('rebounce_engine_radiosity');
   }
 
-  #atVertices(name) {
+  #atVertices(name, to) {
     const begin = performance.now();
-    this.#instance.check(name, this.#address, this.#vertices, this.vertexCount);
+    this.#instance.check(name, this.#living(), to, this.vertexCount);
     this.timings.vertices = performance.now() - begin;
-    return this.#instance.floats(this.#vertices, 3 * this.vertexCount);
+    return this.#instance.floats(to, 3 * this.vertexCount);
   }
   vertexIrradiance() {
-    return this.#atVertices('rebounce_engine_vertex_irradiance');
+    return this.#atVertices('rebounce_engine_vertex_irradiance', this.#vertices.bounced);
   }
   vertexDirectIrradiance() {
-    return this.#atVertices('rebounce_engine_vertex_direct_irradiance');
+    return this.#atVertices('rebounce_engine_vertex_direct_irradiance', this.#vertices.direct);
   }
 
   /**
@@ -269,31 +297,38 @@ export class Engine {
    * chosen, [lights] of 0 and 1. Once in a frame.
    */
   vertexDirectIrradianceOf(chosen) {
+    const address = this.#living();
+    if (chosen.length !== this.#lightCount) {
+      throw new RebounceError(
+          `vertexDirectIrradianceOf: chosen has ${chosen.length} numbers; give one for each of ` +
+          `the ${this.#lightCount} lights of the last frame`);
+    }
     this.#instance.bytes(this.#chosen, chosen.length).set(chosen);
-    this.#instance.check('rebounce_web_chosen_direct', this.#address, this.#chosen, this.#patches,
-                         this.#vertices);
-    return this.#instance.floats(this.#vertices, 3 * this.vertexCount);
+    this.#instance.check('rebounce_web_chosen_direct', address, this.#chosen, this.#patches,
+                         this.#vertices.chosen);
+    return this.#instance.floats(this.#vertices.chosen, 3 * this.vertexCount);
   }
 
   /** The same at patches, [n][3], of the last call of vertexDirectIrradianceOf. */
   chosenDirectIrradiance() {
+    this.#living();
     return this.#instance.floats(this.#patches, 3 * this.patchCount);
   }
 
   /** The light at probes: harmonics of degree 0 to 2, [probeCount][9][3], cd/m². */
   probeLight() {
-    this.#instance.check('rebounce_engine_probe_light', this.#address, this.#probes,
+    this.#instance.check('rebounce_engine_probe_light', this.#living(), this.#probes,
                          this.probeCount);
     return this.#instance.floats(this.#probes, probeFloats * this.probeCount);
   }
 
-  /** Frees the engine's memory. */
+  /** Frees the engine's memory; all other calls throw RebounceError then. */
   dispose() {
     if (this.#address && !this.#instance.broken) {
       this.#instance.call('rebounce_engine_destroy', this.#address);
       for (const address of [
-        this.#lights.address, this.#chosen, this.#sky, this.#milliseconds, this.#vertices,
-        this.#patches, this.#probes,
+        this.#lights.address, this.#chosen, this.#sky, this.#milliseconds, this.#patches,
+        this.#probes, ...Object.values(this.#vertices),
       ]) {
         this.#instance.release(address);
       }
@@ -306,12 +341,14 @@ export class Engine {
 export class Solver {
   #instance;
   #address;
+  #file;  // what messages call it
   #result;
   #vertices;
   #patches;
 
   constructor(instance, transfer, { mesh, patchCount }, buffer, name) {
     this.#instance = instance;
+    this.#file = name;
     this.patchCount = patchCount;
     this.vertexCount = mesh.position.length / 3;
     const bytes = instance.put(new Uint8Array(buffer));
@@ -328,12 +365,16 @@ export class Solver {
     this.#patches = instance.allocate(12 * patchCount);
   }
 
+  #living() {
+    return living(this.#address, `the solver of ${this.#file}`, 'make another with loadSolver()');
+  }
+
   /**
    * Solves for the light of the engine's last frame until it has converged.
    * @returns {number} how far the engine's indirect light is from that, relative
    */
   converge(engine) {
-    this.#instance.check('rebounce_web_solver_converge', this.#address, engine.address,
+    this.#instance.check('rebounce_web_solver_converge', this.#living(), engine.address,
                          this.#result);
     return this.#instance.doubles(this.#result, 1)[0];
   }
@@ -344,7 +385,7 @@ export class Solver {
    *   light is from what has converged
    */
   sweep(engine, count) {
-    this.#instance.check('rebounce_web_solver_sweep', this.#address, engine.address, count,
+    this.#instance.check('rebounce_web_solver_sweep', this.#living(), engine.address, count,
                          this.#result);
     const [milliseconds, error] = this.#instance.doubles(this.#result, 2);
     return { milliseconds, error };
@@ -352,18 +393,19 @@ export class Solver {
 
   /** How far other indirect light of the patches, [n][3], is from what has converged, relative. */
   errorOf(irradiance) {
+    const address = this.#living();
     this.#instance.floats(this.#patches, 3 * this.patchCount).set(irradiance);
-    this.#instance.check('rebounce_web_solver_error', this.#address, this.#patches, this.#result);
+    this.#instance.check('rebounce_web_solver_error', address, this.#patches, this.#result);
     return this.#instance.doubles(this.#result, 1)[0];
   }
 
   vertexIrradiance() {
-    this.#instance.check('rebounce_web_solver_vertex_irradiance', this.#address, this.#vertices,
+    this.#instance.check('rebounce_web_solver_vertex_irradiance', this.#living(), this.#vertices,
                          this.vertexCount);
     return this.#instance.floats(this.#vertices, 3 * this.vertexCount);
   }
 
-  /** Frees the solver's memory. */
+  /** Frees the solver's memory; all other calls throw RebounceError then. */
   dispose() {
     if (this.#address && !this.#instance.broken) {
       this.#instance.call('rebounce_web_solver_destroy', this.#address);

@@ -28,10 +28,6 @@ export class Surface {
     });
   }
 
-  get vertexCount() {
-    return this.position.length / 3;
-  }
-
   /** Values of the file's vertices, [v][size], at those of the surface. */
   spread(values, size) {
     const all = new Float32Array(values.length + size * this.#added.length);

@@ -2,10 +2,21 @@
 
 import * as THREE from 'three';
 
-/** The three.js light as a light of Rebounce; null for one that is neither lamp nor sun. */
+/** Whether three.js draws it: it and all that it is in are visible. */
+function isShown(object) {
+  for (let one = object; one; one = one.parent) {
+    if (!one.visible) return false;
+  }
+  return true;
+}
+
+/**
+ * The three.js light as a light of Rebounce, dark if it or something that it is in is invisible;
+ * null for one that is neither lamp nor sun.
+ */
 export function toLight(light) {
   const position = light.getWorldPosition(new THREE.Vector3()).toArray();
-  const intensity = light.visible ? light.intensity : 0;
+  const intensity = isShown(light) ? light.intensity : 0;
   const plain = { position, color: light.color.toArray(), intensity };
   const alongTarget = () => light.target.getWorldPosition(new THREE.Vector3())
                                 .sub(light.getWorldPosition(new THREE.Vector3())).toArray();
@@ -31,12 +42,13 @@ const brightness = ({ r, g, b }) => 0.2126 * r + 0.7152 * g + 0.0722 * b;
 
 /**
  * The hemisphere light as a sky: uniform above the horizon, and below it in the same colour as
- * bright as the light's ground.
+ * bright as the light's ground; dark as a lamp is.
  */
-export function toSky({ color, groundColor, intensity, visible }) {
+export function toSky(light) {
+  const { color, groundColor, intensity } = light;
   const above = brightness(color);
   return {
-    color: color.toArray(), luminance: visible ? intensity / Math.PI : 0,
+    color: color.toArray(), luminance: isShown(light) ? intensity / Math.PI : 0,
     ground: above > 0 ? brightness(groundColor) / above : 0,
   };
 }

@@ -3,7 +3,10 @@ import type {
 } from 'three';
 import type { Engine, Light, LoadOptions, Sky, Timings, Transfer } from './rebounce.js';
 
-/** The three.js light as a light of Rebounce; null for one that is neither lamp nor sun. */
+/**
+ * The three.js light as a light of Rebounce, dark if it or something that it is in is invisible;
+ * null for one that is neither lamp nor sun.
+ */
 export function toLight(light: ThreeLight): Light | null;
 
 /** A sky; with `type` it looks as that of the CIE. */
@@ -46,7 +49,11 @@ export class TransferLighting {
   attach(object: Object3D): void;
   /** One frame, to be called before the scene is drawn. */
   update(lights: Iterable<ThreeLight | Light>, sky?: LightingSky): void;
-  /** The same surface once more, for other bounced light at the vertices of the file. */
+  /**
+   * The same surface once more, for other bounced light at the vertices of the file; it stays until
+   * `dispose`.
+   */
   makeTwin(): { mesh: Mesh; write: (irradiance: Float32Array) => void };
+  /** Frees memory of the module and of the graphics card; `update` throws RebounceError then. */
   dispose(): void;
 }

@@ -34,6 +34,7 @@ export class TransferLighting {
   #parts = { value: new THREE.Vector2(1, 1) };  // of direct and bounced light that are shown
   #twins = [];
   #attached = [];  // { attribute, vertices } of meshes of the scene's own
+  #copies = [];    // of their materials
   #skyKey = '';
   #direct;
 
@@ -125,10 +126,10 @@ reflectedLight.directSpecular *= rebounceParts.x;`);
   #changeSky({ type, sunDirection, ground }) {
     const key = `${type},${type ? sunDirection : ground}`;
     if (key === this.#skyKey) return;
-    this.#skyKey = key;
     if (type) this.#engine.setSky(type, sunDirection);
     else if (ground !== undefined && this.#transfer.hasSkyCells) this.#engine.setSkyAboveGround(ground);
     else this.#engine.setUniformSky();
+    this.#skyKey = key;  // of a sky that was not refused
   }
 
   #writeDirect(lights, sky) {
@@ -186,6 +187,7 @@ reflectedLight.directSpecular *= rebounceParts.x;`);
       mesh.castShadow = mesh.receiveShadow = true;
       this.#attached.push({ mesh, vertices, attribute: this.#addAttribute(geometry) });
     }
+    this.#copies.push(...copies.values());
   }
 
   #writeAttached() {
@@ -207,7 +209,7 @@ reflectedLight.directSpecular *= rebounceParts.x;`);
   }
 
   /**
-   * The same surface once more, for other bounced light.
+   * The same surface once more, for other bounced light; it stays until `dispose`.
    * @returns {{mesh: THREE.Mesh, write: (irradiance: Float32Array) => void}} what to draw, and how
    *   to give it the light at the vertices of the file
    */
@@ -229,10 +231,11 @@ reflectedLight.directSpecular *= rebounceParts.x;`);
     return { mesh, write };
   }
 
-  /** Frees memory of the module and of the graphics card. */
+  /** Frees memory of the module and of the graphics card; `update` throws RebounceError then. */
   dispose() {
     for (const mesh of [this.mesh, ...this.#twins]) mesh.geometry.dispose();
     for (const { mesh } of this.#attached) mesh.geometry.dispose();
+    for (const copy of this.#copies) copy.dispose();
     for (const material of this.mesh.material) {
       material.map?.dispose();
       material.dispose();

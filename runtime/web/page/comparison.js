@@ -29,6 +29,14 @@ export class Side {
   }
 }
 
+const twins = new WeakMap();
+
+/** The twin of a lighting: one, as it stays as long as the lighting does. */
+function twinOf(lighting) {
+  if (!twins.has(lighting)) twins.set(lighting, lighting.makeTwin());
+  return twins.get(lighting);
+}
+
 /** Gauss-Seidel, which goes on from its last solution. */
 export class GaussSeidel {
   kind = 'gauss-seidel';
@@ -44,7 +52,7 @@ export class GaussSeidel {
   constructor(stage, solver) {
     this.#lighting = stage.lighting;
     this.solver = solver;
-    this.#twin = stage.lighting.makeTwin();
+    this.#twin = twinOf(stage.lighting);
     this.objects = [this.#twin.mesh];
   }
 

@@ -7,6 +7,7 @@ const reach = 26;  // pixels around a lamp in which it can be taken hold of
 export class Hand {
   #stage;
   #held = null;
+  #pointerId = null;  // of the finger or mouse that holds it
   #plane = new THREE.Plane();
   #ray = new THREE.Raycaster();
   #offset = new THREE.Vector3();
@@ -17,6 +18,7 @@ export class Hand {
     const { canvas } = stage;
     // Before the camera's controls hear of it.
     canvas.addEventListener('pointerdown', (event) => {
+      if (this.#held || !event.isPrimary) return;
       const thing = this.#thingAt(event);
       if (!thing) return;
       event.stopImmediatePropagation();
@@ -28,12 +30,13 @@ export class Hand {
       onChoose();
     }, { capture: true });
     canvas.addEventListener('pointermove', (event) => {
-      if (this.#held) this.#drag(event);
-      else canvas.classList.toggle('over', this.#thingAt(event) !== null);
+      if (!this.#held) canvas.classList.toggle('over', this.#thingAt(event) !== null);
+      else if (event.pointerId === this.#pointerId) this.#drag(event);
     });
     for (const end of ['pointerup', 'pointercancel']) {
-      canvas.addEventListener(end, () => {
-        this.#held = null;
+      canvas.addEventListener(end, (event) => {
+        if (event.pointerId !== this.#pointerId) return;
+        this.#held = this.#pointerId = null;
         stage.controls.enabled = true;
         canvas.classList.remove('held');
       });
@@ -61,7 +64,7 @@ export class Hand {
       const place = thing.object.position;
       const at = place.clone().project(camera);
       const apart = Math.hypot((at.x - pointer.x) * view.width, (at.y - pointer.y) * view.height) / 2;
-      const size = thing !== ball ? 0 : view.height * description.ball.radius /
+      const size = thing !== ball ? 0 : camera.view.fullHeight * description.ball.radius /
           (2 * place.distanceTo(camera.position) * Math.tan(camera.fov * Math.PI / 360));
       if (at.z < 1 && apart < Math.max(reach, size) && apart < least) [nearest, least] = [thing, apart];
     }
@@ -73,13 +76,15 @@ export class Hand {
     return this.#ray.ray.intersectPlane(this.#plane, new THREE.Vector3());
   }
 
-  // A thing moves in the plane through it that faces the camera.
+  // A thing moves in the plane through it that faces the camera; if it swings, the middle of that
+  // moves.
   #grab(thing, event) {
     this.#held = thing;
+    this.#pointerId = event.pointerId;
     const towards = this.#stage.camera.getWorldDirection(new THREE.Vector3());
     this.#plane.setFromNormalAndCoplanarPoint(towards, thing.object.position);
     const at = this.#onPlane(event);
-    this.#offset.copy(thing.object.position).sub(at ?? thing.object.position);
+    this.#offset.copy(thing.home).sub(at ?? thing.home);
   }
 
   #drag(event) {

@@ -3,7 +3,7 @@
 import * as THREE from 'three';
 import { makeRing } from './ring.js';
 
-/** What the page offers, and how bright each is beside a point of the same brightness. */
+/** The lamps that the page offers. */
 export const lampKinds = [
   { kind: 'point', title: 'Point' }, { kind: 'spot', title: 'Spot' }, { kind: 'area', title: 'Area' },
 ];

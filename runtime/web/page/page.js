@@ -11,6 +11,7 @@ import { Stage } from './stage.js';
 const loading = document.getElementById('loading');
 const message = document.getElementById('message');
 let running = false;  // whether frames are drawn
+let request = 0;      // of the next one
 
 function say(title, text, action) {
   message.replaceChildren();
@@ -39,6 +40,23 @@ function progress(part, title) {
   if (title) loading.querySelector('p').textContent = title;
 }
 
+let shown = 0;  // number of the progress that is shown
+
+/** Shows how much of something has come, until it ends or something else begins. */
+function beginProgress(title) {
+  const own = ++shown;
+  const onProgress = (part) => {
+    if (own === shown) progress(Math.min(0.99, part), title);
+  };
+  const end = () => {
+    if (own !== shown) return;
+    ++shown;
+    progress(1);
+  };
+  onProgress(0);
+  return { onProgress, end };
+}
+
 function makeStage() {
   if (!isSupported()) {
     say('This browser cannot run the page',
@@ -56,6 +74,13 @@ function makeStage() {
 const stage = makeStage();
 let panel = null, lastTimings = {};
 
+/** Draws frames from now on. */
+function drawFrames() {
+  running = true;
+  cancelAnimationFrame(request);
+  request = requestAnimationFrame(frame);
+}
+
 function frame() {
   if (!running) return;
   try {
@@ -66,7 +91,7 @@ function frame() {
     running = false;
     say('The light has stopped', error.message, { title: 'Load the page again', run: reload });
   }
-  requestAnimationFrame(frame);
+  if (running) request = requestAnimationFrame(frame);
 }
 
 function reload() {
@@ -75,41 +100,40 @@ function reload() {
 
 async function open(id) {
   const description = scenes.find((scene) => scene.id === id) ?? scenes[0];
-  const wasRunning = running;
-  const title = `Loading the ${description.title.toLowerCase()}`;
-  const onProgress = (part) => progress(Math.min(0.99, part), title);
-  onProgress(0);
+  const { onProgress, end } = beginProgress(`Loading the ${description.title.toLowerCase()}`);
   try {
-    const shown = await stage.load(description, `scenes/${description.id}.safetensors`, onProgress);
-    if (!shown) return;
+    const file = `scenes/${description.id}.safetensors`;
+    if (!await stage.load(description, file, onProgress)) return;
+    comparing?.end();
     message.hidden = true;
     document.body.classList.add('begun');
     history.replaceState(null, '', `#${description.id}`);
     panel.showScene();
-    running = true;
-    if (!wasRunning) requestAnimationFrame(frame);
+    drawFrames();
   } catch (error) {
     say('This scene cannot be shown', error.message, { title: 'Try again', run: () => open(id) });
     throw error;
   } finally {
-    progress(1);
+    end();
   }
 }
 
 const comparisons = { 'gauss-seidel': GaussSeidel, probes: ProbeBaking };
+let comparing = null;  // the progress of the one that was asked for last
 
 /** Shows Gauss-Seidel or a grid of probes beside, with form factors that are fetched now; or none. */
 async function compare(kind, settings = {}) {
-  const onProgress = (part) => progress(Math.min(0.99, part), 'Loading the form factors');
+  comparing?.end();
+  if (!comparisons[kind]) {
+    stage.closeComparison();
+    message.hidden = true;
+    panel.showComparison();
+    return;
+  }
+  const { onProgress, end } = comparing = beginProgress('Loading the form factors');
   try {
-    if (comparisons[kind]) {
-      onProgress(0);
-      const name = stage.description.id;
-      await stage.openComparison(
-          comparisons[kind], settings, `scenes/${name}.form_factors.safetensors`, onProgress);
-    } else {
-      stage.closeComparison();
-    }
+    const file = `scenes/${stage.description.id}.form_factors.safetensors`;
+    if (!await stage.openComparison(comparisons[kind], settings, file, onProgress)) return;
     message.hidden = true;
     panel.showComparison();
   } catch (error) {
@@ -117,7 +141,7 @@ async function compare(kind, settings = {}) {
         { title: 'Try again', run: () => compare(kind, settings).catch(() => {}) });
     throw error;
   } finally {
-    progress(1);
+    end();
   }
 }
 
@@ -150,11 +174,7 @@ window.rebounce = {
     lastTimings = { ...stage.lighting.timings };
     stage.draw();
   },
-  resume() {
-    if (running) return;
-    running = true;
-    requestAnimationFrame(frame);
-  },
+  resume: drawFrames,
   compare,
   indirectIrradiance: () => stage.lighting.engine.indirectIrradiance().slice(),
   get timings() {

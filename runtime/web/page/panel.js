@@ -32,6 +32,7 @@ export class Panel {
   #onCompare;
   #part = 'all';
   #times = new Map();
+  #items = new Map();  // of lamps: the element, and what brings it up to date
 
   /** Calls onScene(id) and onCompare(kind) when asked for another scene, or for another half. */
   constructor(stage, scenes, onScene, onCompare) {
@@ -71,6 +72,7 @@ export class Panel {
   #onKey(event) {
     if (event.target.matches('input, button') && event.key === ' ') return;
     if (event.ctrlKey || event.metaKey || event.altKey) return;
+    if (!this.#stage.lighting) return;  // no scene is there
     const beside = (kind) => this.#onCompare(this.#stage.comparison?.kind === kind ? '' : kind);
     const actions = {
       1: () => this.show('all'), 2: () => this.show('bounced'), 3: () => this.show('direct'),
@@ -80,8 +82,8 @@ export class Panel {
     };
     const act = actions[event.key.toLowerCase()];
     if (!act) return;
-    act();
     event.preventDefault();
+    if (!event.repeat) act();
   }
 
   #chooseNext() {
@@ -119,16 +121,19 @@ export class Panel {
   show(part) {
     this.#part = part;
     this.#stage.show(part);
-    for (const button of byId('parts').children) {
-      button.setAttribute('aria-checked', button.dataset.part === part);
-    }
+    for (const button of byId('parts').children) press(button, button.dataset.part === part);
   }
 
   #setHour(hour) {
     this.#stage.setHour(hour);
     this.#stage.relight();
     this.#stage.expose();
+    this.#showHour(hour);
+  }
+
+  #showHour(hour) {
     byId('clock').textContent = clockText(hour);
+    byId('hour').setAttribute('aria-valuetext', clockText(hour));
   }
 
   #setPace() {
@@ -136,13 +141,14 @@ export class Panel {
     if (!comparison) return;
     comparison.pace = Number(byId('pace').value);
     byId('pace-text').textContent = comparison.paceText;
+    byId('pace').setAttribute('aria-valuetext', comparison.paceText);
   }
 
   /** To be called when the other half was opened or closed. */
   showComparison() {
     const { comparison } = this.#stage;
     for (const button of byId('compare').children) {
-      button.setAttribute('aria-checked', button.dataset.kind === (comparison?.kind ?? ''));
+      press(button, button.dataset.kind === (comparison?.kind ?? ''));
     }
     for (const id of ['pace', 'pace-text', 'halves']) byId(id).hidden = !comparison;
     document.body.classList.toggle('split', Boolean(comparison));
@@ -152,7 +158,7 @@ export class Panel {
       byId('halves').children[1].firstElementChild.textContent = comparison.title;
       this.#setPace();
     }
-    this.place();
+    this.showLamps();
   }
 
   /** To be called when the page has another size, or the controls have. */
@@ -188,7 +194,6 @@ export class Panel {
 
   /** To be called when another scene is there. */
   showScene() {
-    this.showComparison();
     const { description, hour } = this.#stage;
     for (const button of byId('scenes').children) {
       button.setAttribute('aria-current', button.dataset.scene === description.id);
@@ -196,58 +201,85 @@ export class Panel {
     byId('sun').hidden = hour === null;
     if (hour !== null) {
       byId('hour').value = hour;
-      byId('clock').textContent = clockText(hour);
+      this.#showHour(hour);
     }
     this.show(this.#part);
-    this.showLamps();
+    this.showComparison();
   }
 
   /** To be called when lamps were added, taken away or chosen. */
   showLamps() {
-    byId('lamps').replaceChildren(...this.#stage.lamps.map((lamp) => this.#lampItem(lamp)));
-    for (const button of byId('add').children) {
-      button.disabled = this.#stage.lamps.length >= mostLamps;
+    const { lamps } = this.#stage;
+    for (const [lamp, { item }] of this.#items) {
+      if (lamps.includes(lamp)) continue;
+      item.remove();
+      this.#items.delete(lamp);
     }
+    for (const lamp of lamps) {
+      if (!this.#items.has(lamp)) {
+        this.#items.set(lamp, this.#lampItem(lamp));
+        byId('lamps').append(this.#items.get(lamp).item);
+      }
+      this.#items.get(lamp).refresh();
+    }
+    for (const button of byId('add').children) button.disabled = lamps.length >= mostLamps;
+    this.#showChosen();
     this.place();
   }
 
+  #titleOf(lamp) {
+    const { title } = lampKinds.find(({ kind }) => kind === lamp.kind);
+    return `${title} ${this.#stage.lamps.indexOf(lamp) + 1}`;
+  }
+
+  #showChosen() {
+    const { chosen, ball } = this.#stage;
+    for (const [lamp, { item }] of this.#items) item.setAttribute('aria-current', lamp === chosen);
+    const text = chosen ? `${chosen === ball ? 'The ball' : this.#titleOf(chosen)} is chosen` : '';
+    if (byId('chosen').textContent !== text) byId('chosen').textContent = text;
+  }
+
   #lampItem(lamp) {
-    const { title: kind } = lampKinds.find((one) => one.kind === lamp.kind);
-    const title = `${kind} ${this.#stage.lamps.indexOf(lamp) + 1}`;
-    const color = element('input', { type: 'color', value: lamp.color, 'aria-label': `${title}: colour` });
+    const color = element('input', { type: 'color' });
     color.addEventListener('input', () => { lamp.color = color.value; });
-    const power = element('input', {
-      type: 'range', min: -2, max: 2, step: 0.01, value: Math.log2(lamp.part),
-      'aria-label': `${title}: brightness`,
-    });
+    const power = element('input', { type: 'range', min: -2, max: 2, step: 0.01 });
     power.addEventListener('input', () => {
       lamp.part = 2 ** Number(power.value);
       lamp.refresh();
+      refresh();
     });
-    const toggle = element('button', {
-      class: 'power', 'aria-pressed': lamp.on, title: 'Switch on or off (key: O)',
-      'aria-label': `${title}: on`,
-    });
+    const toggle = element('button', { class: 'power', title: 'Switch on or off (key: O)' });
     toggle.addEventListener('click', () => {
       lamp.on = !lamp.on;
       lamp.refresh();
-      toggle.setAttribute('aria-pressed', lamp.on);
+      refresh();
     });
-    const remove = element(
-        'button', { class: 'remove', title: 'Remove', 'aria-label': `${title}: remove` }, '\u00D7');
+    const remove = element('button', { class: 'remove', title: 'Remove' }, '\u00D7');
     remove.addEventListener('click', () => {
       this.#stage.removeLamp(lamp);
       this.showLamps();
+      // Keys go on from a control that is there.
+      const last = byId('lamps').lastElementChild;
+      (last?.querySelector('.remove') ?? byId('add').firstElementChild).focus();
     });
-    const item = element('li', {}, color, power, toggle, remove);
-    item.classList.toggle('chosen', lamp === this.#stage.chosen);
+    const controls = { colour: color, brightness: power, on: toggle, remove };
+    const item = element('li', {}, ...Object.values(controls));
     for (const type of ['pointerdown', 'focusin']) {
       item.addEventListener(type, () => {
         this.#stage.chosen = lamp;
-        for (const other of byId('lamps').children) other.classList.toggle('chosen', other === item);
+        this.#showChosen();
       });
     }
-    return item;
+    const refresh = () => {
+      for (const [name, control] of Object.entries(controls)) {
+        control.setAttribute('aria-label', `${this.#titleOf(lamp)}: ${name}`);
+      }
+      color.value = lamp.color;
+      power.value = Math.log2(lamp.part);
+      power.setAttribute('aria-valuetext', percent(lamp.part));
+      press(toggle, lamp.on);
+    };
+    return { item, refresh };
   }
 
   #makeTimes() {

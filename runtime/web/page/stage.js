@@ -25,7 +25,8 @@ export class Stage {
   skyIsOn = true;
   covered = { above: 0, below: 0, right: 0 };  // pixels of the canvas
   part = 'all';  // of the light
-  #turn = 0;
+  #turn = 0;            // of the scene that was asked for last
+  #comparisonTurn = 0;  // of the comparison, or none, that was asked for last
 
   constructor(canvas) {
     this.canvas = canvas;
@@ -47,13 +48,16 @@ export class Stage {
 
   /**
    * Shows another scene; the one before stays until this one is there.
-   * @returns {Promise<boolean>} false if a later call came before the file
+   * @returns {Promise<boolean>} false if a later call came before the file, or before it failed
    */
   async load(description, url, onProgress) {
     const turn = ++this.#turn;
-    const lighting = await TransferLighting.load(url, { onProgress });
+    const lighting = await TransferLighting.load(url, { onProgress }).catch((error) => {
+      if (turn === this.#turn) throw error;
+      return null;
+    });
     if (turn !== this.#turn) {
-      lighting.dispose();
+      lighting?.dispose();
       return false;
     }
     this.#clear();
@@ -189,22 +193,30 @@ export class Stage {
   /**
    * Shows something beside, by one of the classes of comparisons with its settings; the form factors
    * of what has converged are another file.
+   * @returns {Promise<boolean>} false if another, none or another scene was asked for before the
+   *   file came, or before it failed
    */
   async openComparison(Comparison, settings, url, onProgress) {
-    const { lighting } = this;
-    const solver = await lighting.transfer.loadSolver(url, { onProgress });
-    if (lighting !== this.lighting) {
-      solver.dispose();
-      return;
+    const turn = ++this.#comparisonTurn;
+    const solver = await this.lighting.transfer.loadSolver(url, { onProgress }).catch((error) => {
+      if (turn === this.#comparisonTurn) throw error;
+      return null;
+    });
+    if (turn !== this.#comparisonTurn) {
+      solver?.dispose();
+      return false;
     }
     this.closeComparison();
     this.comparison = new Comparison(this, solver, settings);
     for (const object of this.comparison.objects) object.visible = false;
     this.scene.add(...this.comparison.objects);
+    if (!this.movable.includes(this.chosen)) this.chosen = this.lamps.at(-1) ?? null;
     this.resize();
+    return true;
   }
 
   closeComparison() {
+    ++this.#comparisonTurn;
     if (!this.comparison) return;
     this.scene.remove(...this.comparison.objects);
     this.comparison.dispose();
@@ -230,24 +242,39 @@ export class Stage {
     if (this.chosen === lamp) this.chosen = this.lamps.at(-1) ?? null;
   }
 
+  // Probes of the file hold our light alone.
+  get #showsBall() {
+    return this.ball !== null && this.comparison?.kind !== 'gauss-seidel';
+  }
+
+  /** Lamps, and the ball where there is one. */
+  get things() {
+    return this.ball ? [...this.lamps, this.ball] : this.lamps;
+  }
+
   /** What can be dragged. */
   get movable() {
-    return this.ball ? [...this.lamps, this.ball] : this.lamps;
+    return this.#showsBall ? this.things : this.lamps;
+  }
+
+  // Changes a position of a lamp or the ball to the nearest that is within the scene.
+  #keepInside(thing, position) {
+    const margin = thing === this.ball
+        ? this.description.ball.radius : 1.5 * this.description.lampRadius;
+    position.clamp(
+        this.bounds.min.clone().addScalar(margin), this.bounds.max.clone().subScalar(margin));
   }
 
   /** Moves a lamp or the ball to `position`, or as near to it as the scene reaches. */
   move(thing, position) {
-    const margin = thing === this.ball
-        ? this.description.ball.radius : 1.5 * this.description.lampRadius;
-    thing.home.copy(position).clamp(
-        this.bounds.min.clone().addScalar(margin), this.bounds.max.clone().subScalar(margin));
+    this.#keepInside(thing, thing.home.copy(position));
     thing.object.position.copy(thing.home);
   }
 
   /** Lets lamps swing around where they are, or leaves them where they have come to. */
   toggleSwing() {
     this.swinging = !this.swinging;
-    for (const { home, object } of this.movable) home.copy(object.position);
+    for (const { home, object } of this.things) home.copy(object.position);
   }
 
   /** Sets sun and sky; null: neither. */
@@ -307,7 +334,10 @@ export class Stage {
   frame() {
     if (this.swinging) {
       const seconds = (performance.now() - this.begun) / 1000;
-      this.movable.forEach((thing, k) => thing.swing(seconds + 1.3 * k, 0.16 * this.size));
+      this.things.forEach((thing, k) => {
+        thing.swing(seconds + 1.3 * k, 0.16 * this.size);
+        this.#keepInside(thing, thing.object.position);
+      });
     }
     this.controls.update();
     this.relight();
@@ -319,7 +349,7 @@ export class Stage {
 
   /** Draws what the last frame has lit, in one view or in two. */
   draw() {
-    for (const thing of this.movable) thing.face(this.camera, thing === this.chosen);
+    for (const thing of this.things) thing.face(this.camera, thing === this.chosen);
     const views = this.views();
     const { renderer, scene, camera, canvas, comparison } = this;
     if (views.length > 1) {
@@ -335,8 +365,7 @@ export class Stage {
       const isOther = k === 1;
       this.lighting.mesh.visible = !isOther;
       for (const object of comparison?.objects ?? []) object.visible = isOther;
-      // Probes of the file hold our light alone.
-      if (this.ball) this.ball.object.visible = comparison?.kind !== 'gauss-seidel';
+      if (this.ball) this.ball.object.visible = this.#showsBall;
       const restore = isOther ? comparison.begin() : () => {};
       renderer.shadowMap.autoUpdate = !isOther;
       renderer.render(scene, camera);

@@ -65,7 +65,13 @@ test('direct light can be split by lamps', async () => {
   const transfer = await load();
   const engine = transfer.createEngine();
   engine.relight(lights, sky);
-  const all = engine.vertexDirectIrradiance().slice();
+  const direct = engine.vertexDirectIrradiance(), all = direct.slice();
+  engine.vertexIrradiance();
+  assert.deepEqual(direct, all, 'each result has a place of its own');
+  for (const count of [3, 100]) {
+    assert.throws(() => engine.vertexDirectIrradianceOf(Array(count).fill(1)),
+                  new RegExp(`${count} numbers.* 4 lights`));
+  }
   const every = engine.vertexDirectIrradianceOf(lights.map(() => 1)).slice();
   assert.deepEqual(every, all);
   const some = engine.vertexDirectIrradianceOf([0, 1, 0, 0]).slice();
@@ -121,7 +127,8 @@ test('what is out of range is refused, and the last frame stays', async () => {
   const before = engine.indirectIrradiance().slice();
   for (const [bad, message] of [
     [[{}, { intensity: -1 }], /light 1: .*intensity/], [[{ type: 'sphere' }], /light 0: .*radius/],
-    [[{ type: 'candle' }], /candle/],
+    [[{ type: 'candle' }], /candle/], [[{}, { color: [1, 0.8, 0.6, 1] }], /light 1: color .*three/],
+    [[{ position: [1, 2] }], /light 0: position/], [[{ direction: 1 }], /light 0: direction/],
   ]) {
     assert.throws(() => engine.relight(bad), (error) => {
       assert.ok(error instanceof RebounceError);
@@ -129,6 +136,10 @@ test('what is out of range is refused, and the last frame stays', async () => {
       return true;
     });
   }
+  assert.throws(() => engine.relight(lights, { color: [1, 1] }), /sky: color/);
+  assert.throws(() => engine.setSky(12, [0, -1]), /sunDirection/);
+  assert.throws(() => engine.skyPanorama(12, [], 2, 2), /sunDirection/);
+  assert.throws(() => engine.setEmissionScale(0, [1]), /scale/);
   assert.throws(() => engine.setSky(99, [0, -1, 0]), RebounceError);
   assert.throws(() => engine.setEmissionScale(1000, [1, 1, 1]), /material/);
   assert.deepEqual(engine.indirectIrradiance(), before);
@@ -136,6 +147,49 @@ test('what is out of range is refused, and the last frame stays', async () => {
   assert.deepEqual(engine.indirectIrradiance(), before);
   engine.dispose();
   transfer.dispose();
+});
+
+test('what has been disposed of is refused', async () => {
+  const isRefused = (error) => error instanceof RebounceError && /disposed of/.test(error.message);
+  const formFactors = () => ofPage('cornell_box.form_factors.safetensors');
+  const transfer = await Transfer.load(ofPage('cornell_box.safetensors'), { name: 'box' });
+  const engine = transfer.createEngine();
+  const solver = await transfer.loadSolver(formFactors());
+  const late = transfer.loadSolver(formFactors());
+  transfer.dispose();
+  await assert.rejects(late, isRefused);
+  assert.throws(() => transfer.createEngine(), isRefused);
+  engine.relight(lights, sky);  // goes on without the file
+  const light = engine.indirectIrradiance().slice();
+  engine.dispose();
+  for (const call of [
+    () => engine.relight(lights), () => engine.relight(Array(100).fill(lights[0])),
+    () => engine.setSky(12, [0, -1, 0]), () => engine.skyPanorama(12, [0, -1, 0], 2, 2),
+    () => engine.setUniformSky(), () => engine.setSkyAboveGround(0.5),
+    () => engine.setEmissionScale(0, [1, 1, 1]), () => engine.directIrradiance(),
+    () => engine.indirectIrradiance(), () => engine.radiosity(), () => engine.vertexIrradiance(),
+    () => engine.vertexDirectIrradiance(),
+    () => engine.vertexDirectIrradianceOf(lights.map(() => 1)),
+    () => engine.chosenDirectIrradiance(), () => engine.probeLight(),
+    () => solver.converge(engine), () => solver.sweep(engine, 1),
+  ]) {
+    assert.throws(call, isRefused, String(call));
+  }
+  solver.dispose();
+  assert.throws(() => solver.errorOf(light), isRefused);
+  assert.throws(() => solver.vertexIrradiance(), isRefused);
+  for (const one of [solver, engine, transfer]) one.dispose();  // a second time
+});
+
+test('loads at once share one instance, and a failure is not kept', async (t) => {
+  const { Instance: Fresh } = await import(`${join(web, 'library/instance.js')}?fresh`);
+  const { mock } = t.mock.method(WebAssembly, 'validate', () => false);
+  await assert.rejects(Fresh.get(), /lacks SIMD/);
+  mock.restore();
+  const [one, other] = await Promise.all([Fresh.get(), Fresh.get()]);
+  assert.ok(one === other);
+  assert.throws(() => one.call('nothing'), /has stopped/);
+  assert.ok(await Fresh.get() !== one, 'a new one after that broke');
 });
 
 test('a file that is damaged is refused with a reason', async () => {

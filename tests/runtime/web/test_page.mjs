@@ -236,7 +236,7 @@ test("three.js's grid of probes beside is baked anew when a lamp is switched, an
   await makeShadowsCoarse(page);
   // Fewer probes than the page has: their drawing is slow without a graphics card.
   await page.evaluate(() => window.rebounce.compare('probes', { probeCount: 60 }));
-  assert.equal(await page.locator('#compare [aria-checked=true]').textContent(), 'Probes');
+  assert.equal(await page.locator('#compare [aria-pressed=true]').textContent(), 'Probes');
   await page.locator('#pace').fill('32');
   assert.match(await page.textContent('#pace-text'), /32 probes/);
   const settle = () => page.waitForFunction(() => {
@@ -284,11 +284,20 @@ test('it works by keyboard', async () => {
   assert.equal((await press('o')).on, false);
   assert.equal((await press('o')).on, true);
   assert.equal((await press('a')).lamps, 2);
+  assert.equal(await page.locator('#lamps [aria-current=true]').count(), 1);
   assert.equal((await press('n')).chosen, 'ball');
+  assert.equal(await page.locator('#lamps [aria-current=true]').count(), 0);
+  assert.equal(await page.textContent('#chosen'), 'The ball is chosen');
   assert.notEqual((await press('ArrowRight')).ball, before.ball);
   assert.notEqual((await press('Shift+ArrowRight')).camera, before.camera);
   await page.focus('#lamps li:first-child input[type=range]');
   assert.equal((await state()).chosen, 0, 'the lamp whose slider has the focus');
+  const focused = () => page.evaluate(() => document.activeElement.getAttribute('aria-label'));
+  for (const on of [false, true]) assert.equal((await press('o')).on, on);
+  assert.equal(await focused(), 'Point 1: brightness');
+  await page.focus('#lamps li:last-child .remove');
+  assert.equal((await press('Enter')).lamps, 1);
+  assert.equal(await focused(), 'Point 1: remove');
   await page.keyboard.press('c');
   await page.waitForFunction(() => window.rebounce.stage.comparison?.kind === 'gauss-seidel');
   assert.equal((await press('c')).comparison, undefined);
@@ -318,6 +327,178 @@ test('the ball is lit by probes, and can be dragged', async () => {
   });
   assert.ok(to > 0 && to < 0.1, 'within the scene');
   assert.deepEqual(faults, []);
+});
+
+test('keys wait for the scene, and do not repeat', async () => {
+  let answer;
+  const isPressed = new Promise((resolve) => { answer = resolve; });
+  const wait = async (route) => {
+    await isPressed;
+    await route.continue();
+  };
+  const { page, faults } = await open(undefined, (made) => made.route('**/*.safetensors', wait));
+  for (const key of ['1', 'a', 'n', 'o', 'c', 'g', ' ', 'ArrowLeft']) await page.keyboard.press(key);
+  assert.ok(await page.locator('#message').isHidden());
+  assert.ok(await page.locator('#loading').isVisible());
+  answer();
+  await page.evaluate(() => window.rebounce.ready);
+  await page.waitForSelector('#loading', { state: 'hidden' });
+  assert.equal(await page.locator('#lamps li').count(), 1);
+  for (let k = 0; k < 3; ++k) await page.keyboard.down('a');
+  await page.keyboard.up('a');
+  assert.equal(await page.locator('#lamps li').count(), 2);
+  assert.deepEqual(faults, []);
+});
+
+test('a lamp follows the pointer that holds it alone, and swings within the scene', async () => {
+  const { page, faults } = await openReady();
+  const home = () => page.evaluate(() => window.rebounce.stage.lamps[0].home.toArray());
+  const apart = (a, b) => Math.hypot(...a.map((x, k) => x - b[k]));
+  const lamp = await lampPlace(page);
+  await page.mouse.move(lamp.x, lamp.y);
+  await page.mouse.down();
+  const first = await home();
+  await page.evaluate(({ x, y }) => {
+    for (const type of ['pointerdown', 'pointermove', 'pointerup']) {
+      document.getElementById('view').dispatchEvent(
+          new PointerEvent(type, { pointerId: 77, clientX: x - 80, clientY: y, bubbles: true }));
+    }
+  }, lamp);
+  assert.deepEqual(await home(), first, 'by another finger');
+  await page.mouse.move(lamp.x - 30, lamp.y);
+  await frames(page);
+  assert.ok(apart(await home(), first) > 0.01, 'by the first one');
+  await page.mouse.up();
+
+  const second = await home();
+  const swung = await page.evaluate(() => {
+    const { stage, setLights } = window.rebounce;
+    stage.toggleSwing();
+    stage.begun = performance.now() - 924;  // a quarter of its way from side to side
+    stage.frame();
+    setLights([]);  // no more frames
+    return stage.lamps[0].object.position.toArray();
+  });
+  assert.ok(apart(swung, second) > 0.05);
+  const place = await lampPlace(page);
+  await page.mouse.move(place.x, place.y);
+  await page.mouse.down();
+  await page.mouse.move(place.x + 2, place.y);
+  await frames(page);
+  const moved = apart(await home(), second);
+  assert.ok(moved > 0 && moved < 0.03, `moved by ${moved}`);
+  await page.mouse.up();
+
+  const isInside = await page.evaluate(() => {
+    const { stage } = window.rebounce;
+    stage.move(stage.lamps[0], stage.bounds.max);
+    return [0, 1, 2, 3].map((k) => {
+      stage.begun = performance.now() - 924 * k;
+      stage.frame();
+      return stage.things.every(({ object }) => stage.bounds.containsPoint(object.position));
+    });
+  });
+  assert.deepEqual(isInside, [true, true, true, true]);
+  assert.deepEqual(faults, []);
+});
+
+test('frames that were stopped go on once', async () => {
+  const { page, faults } = await openReady();
+  const count = await page.evaluate(async () => {
+    const { stage, setLights, resume } = window.rebounce;
+    for (let k = 0; k < 3; ++k) {
+      setLights([]);
+      resume();
+    }
+    let drawn = 0;
+    const frame = stage.frame.bind(stage);
+    stage.frame = () => {
+      ++drawn;
+      return frame();
+    };
+    for (let k = 0; k < 5; ++k) await new Promise((resolve) => { requestAnimationFrame(resolve); });
+    return drawn;
+  });
+  assert.equal(count, 5);
+  assert.deepEqual(faults, []);
+});
+
+test('the comparison that was asked for last is shown, whichever file comes first', async () => {
+  const { page, faults } = await openReady();
+  await makeShadowsCoarse(page);
+  const found = await page.evaluate(async () => {
+    const { stage, compare } = window.rebounce;
+    const kind = () => stage.comparison?.kind ?? 'none';
+    stage.chosen = stage.ball;
+    await compare('gauss-seidel');
+    const [twin] = stage.comparison.objects;
+    const isHeld = stage.movable.includes(stage.ball) || stage.chosen === stage.ball;
+    await compare('');
+    await compare('gauss-seidel');
+    const isSame = stage.comparison.objects[0] === twin;
+    await compare('');
+
+    const { transfer } = stage.lighting;
+    const load = transfer.loadSolver.bind(transfer);
+    const waiting = window.waiting = [];
+    transfer.loadSolver = async (...given) => {
+      await new Promise((resolve) => { waiting.push(resolve); });
+      return load(...given);
+    };
+    const cancelled = compare('gauss-seidel');
+    await compare('');
+    waiting[0]();
+    await cancelled;
+    const none = kind();
+    const [first, last] = [compare('gauss-seidel'), compare('probes', { probeCount: 60 })];
+    waiting[2]();
+    await last;
+    waiting[1]();
+    await first;
+    const probes = kind();
+    await compare('');
+    window.late = compare('gauss-seidel');
+    return { isHeld, isSame, none, probes };
+  });
+  assert.deepEqual(found, { isHeld: false, isSame: true, none: 'none', probes: 'probes' });
+  // Its scene is gone when the file comes.
+  await page.click('#scenes [data-scene=furnished_room]');
+  await page.waitForFunction(() => window.rebounce.stage.description.id === 'furnished_room');
+  await page.evaluate(() => {
+    window.waiting[3]();
+    return window.late;
+  });
+  assert.ok(await page.locator('#message').isHidden());
+  assert.equal(await page.evaluate(() => window.rebounce.stage.comparison), null);
+  await page.waitForSelector('#loading', { state: 'hidden' });
+  assert.deepEqual(faults, []);
+});
+
+test('a scene that fails after another was asked for says nothing', async () => {
+  const { page } = await openReady();
+  let fail;
+  const failure = new Promise((resolve) => { fail = resolve; });
+  await page.route('**/pavilion.safetensors', async (route) => {
+    await failure;
+    await route.fulfill({ status: 404 });
+  });
+  await page.click('#scenes [data-scene=pavilion]');
+  await page.click('#scenes [data-scene=furnished_room]');
+  await page.waitForFunction(() => window.rebounce.stage.description.id === 'furnished_room');
+  const answer = page.waitForResponse('**/pavilion.safetensors');
+  fail();
+  await answer;
+  await frames(page);
+  assert.ok(await page.locator('#message').isHidden());
+  assert.equal(await page.evaluate(() => window.rebounce.stage.description.id), 'furnished_room');
+});
+
+test('the server refuses what it cannot read, and answers on', async () => {
+  for (const [path, status] of [['%', 400], ['/', 400], ['nothing', 404], ['', 200]]) {
+    const response = await fetch(server.url + path);
+    await response.text();
+    assert.equal(response.status, status, `/${path}`);
+  }
 });
 
 test('600 frames take no further memory', async () => {

@@ -16,6 +16,7 @@ const THREE = await import(join(web, 'node_modules/three/build/three.module.js')
 const { GLTFLoader } = await import(join(web, 'node_modules/three/examples/jsm/loaders/GLTFLoader.js'));
 const { RebounceError } = await import(join(web, 'library/rebounce.js'));
 const { TransferLighting, toLight } = await import(join(web, 'library/transfer_lighting.js'));
+const { toSky } = await import(join(web, 'library/three_lights.js'));
 
 const bytesOf = (path) => new Uint8Array(readFileSync(path)).buffer;
 const load = (name) => TransferLighting.load(
@@ -103,6 +104,48 @@ test('a mesh that does not fit the file is refused, and nothing is changed', asy
   lighting.dispose();
 });
 
+test('a group without an end is cut as a mesh without groups is', async () => {
+  const lighting = await load('cornell_box');
+  const [plain, grouped] = [await sceneOf('cornell_box'), await sceneOf('cornell_box')];
+  for (const { geometry } of meshesOf(grouped)) {
+    geometry.clearGroups();
+    geometry.addGroup(0, Infinity, 0);
+  }
+  for (const scene of [plain, grouped]) lighting.attach(scene);
+  assert.deepEqual(meshesOf(grouped).map(areaOf), meshesOf(plain).map(areaOf));
+  lighting.dispose();
+});
+
+test('all that it has made is disposed of with it, and it lights no more', async () => {
+  const lighting = await load('cornell_box');
+  const scene = await sceneOf('cornell_box');
+  lighting.attach(scene);
+  const left = new Set([...meshesOf(scene), lighting.mesh, lighting.makeTwin().mesh].flatMap(
+      (mesh) => [mesh.geometry, mesh.material].flat()));
+  for (const one of left) one.addEventListener('dispose', () => left.delete(one));
+  lighting.dispose();
+  assert.equal(left.size, 0);
+  assert.throws(() => lighting.update([]), (error) => {
+    assert.ok(error instanceof RebounceError);
+    assert.match(error.message, /engine of cornell_box has been disposed of/);
+    return true;
+  });
+});
+
+test('a light is dark if it or something that it is in is invisible', () => {
+  const lamp = new THREE.PointLight('white', 5), over = new THREE.HemisphereLight('white', 'white', 5);
+  const group = new THREE.Group().add(new THREE.Group().add(lamp, over));
+  const bright = () => [toLight(lamp).intensity, toSky(over).luminance].map((value) => value > 0);
+  assert.deepEqual(bright(), [true, true]);
+  for (const one of [group, group.children[0]]) {
+    one.visible = false;
+    assert.deepEqual(bright(), [false, false]);
+    one.visible = true;
+  }
+  lamp.visible = over.visible = false;
+  assert.deepEqual(bright(), [false, false]);
+});
+
 test('all lights of three.js that stand in a scene are taken', () => {
   const types = [
     new THREE.PointLight(), new THREE.SpotLight(), new THREE.DirectionalLight(),
@@ -135,5 +178,9 @@ test('a hemisphere light is a sky above a ground', async () => {
   assert.notDeepEqual(lighting.engine.directIrradiance().slice(), uniform);
   lighting.update([], sky);
   assert.deepEqual(lighting.engine.directIrradiance().slice(), uniform, 'a sky leaves no trace');
+  for (let k = 0; k < 2; ++k) {
+    assert.throws(() => lighting.update([], { ...sky, type: 99, sunDirection: [0, -1, 0] }),
+                  RebounceError, `frame ${k}`);
+  }
   lighting.dispose();
 });
