@@ -10,6 +10,7 @@ Usage: ranks.py PROGRAM WORK [--moments N] [--stages N] [--most RANKS] [--seed S
 
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import time
@@ -128,6 +129,7 @@ def main():
                 faults += 1
                 print(f"FAULT: {name}: {fault}")
         print(f"{name:<24} {killed} of {options.moments} killed before the end", flush=True)
+    shutil.rmtree(work, ignore_errors=True)
     return 1 if faults else 0
 
 

@@ -317,14 +317,15 @@ TEST(Picture, ExposureBringsUniformGreyToAQuarterOfWhiteAndCanBeFixed) {
 
 TEST(Picture, TextureIsFilteredAndMultiplied) {
   SceneBuilder scene;
-  const std::uint32_t white = scene.add_material({1, 1, 1});
-  scene.add_rectangle(floor_corners(1), white);
+  const std::uint32_t tinted = scene.add_material({0.5F, 1, 0.25F});
+  scene.add_rectangle(floor_corners(1), tinted);
   // A checkerboard of black and white texels: its mean is one half in linear light.
   ScreenImage checker{.width = 64, .height = 64};
   for (int k = 0; k < 64 * 64; ++k) {
     checker.rgb.insert(checker.rgb.end(), 3, (k / 64 + k) % 2 == 0 ? 255 : 0);
   }
-  const auto path = std::filesystem::temp_directory_path() / "rebounce_test_checker.png";
+  const test::TemporaryFolder folder;
+  const auto path = folder / "checker.png";
   write_png(path, checker);
   std::FILE* file = std::fopen(path.c_str(), "rb");
   ASSERT_NE(file, nullptr);
@@ -333,19 +334,22 @@ TEST(Picture, TextureIsFilteredAndMultiplied) {
     texture.encoded.push_back(static_cast<std::uint8_t>(byte));
   }
   std::fclose(file);
-  std::filesystem::remove(path);
   scene.data().textures.push_back(texture);
-  scene.data().materials[white].base_color_texture = 0;
+  scene.data().materials[tinted].base_color_texture = 0;
   const std::vector<Float3> indirect{{kPi, kPi, kPi}};
   PictureSettings settings;
   settings.width = settings.height = 5;  // about 20 x 20 texels in a pixel
   settings.camera = look_at({0, 5, 0}, {0, 0, 0}, 0.25F);
   settings.show = Show::kIndirect;
   const Picture far = render(scene.data(), {.indirect_irradiance = indirect}, settings);
-  for (const Float3& pixel : far.pixel) EXPECT_NEAR(pixel[1], 0.5F, 0.01F);
+  for (const Float3& pixel : far.pixel) {
+    EXPECT_NEAR(pixel[0], 0.25F, 0.01F);
+    EXPECT_NEAR(pixel[1], 0.5F, 0.01F);
+    EXPECT_NEAR(pixel[2], 0.125F, 0.01F);
+  }
   settings.camera = look_at({0.0156F, 0.5F, 0.0156F}, {0.0156F, 0, 0.0156F}, 0.01F);
   const Picture near = render(scene.data(), {.indirect_irradiance = indirect}, settings);
-  EXPECT_TRUE(near.pixel[12][0] > 0.9F || near.pixel[12][0] < 0.1F) << near.pixel[12][0];
+  EXPECT_TRUE(near.pixel[12][1] > 0.9F || near.pixel[12][1] < 0.1F) << near.pixel[12][1];
 }
 
 TEST(Picture, DamagedTextureIsRefused) {
@@ -433,8 +437,7 @@ TEST(ToneMap, DitheringKeepsTheMeanAndExactBlack) {
 TEST(Png, IsWrittenAndReadBack) {
   ScreenImage image{.width = 7, .height = 5};
   for (int k = 0; k < 7 * 5 * 3; ++k) image.rgb.push_back(static_cast<std::uint8_t>(k * 37));
-  const auto folder = std::filesystem::temp_directory_path() / "rebounce_test_png";
-  std::filesystem::create_directories(folder);
+  const test::TemporaryFolder folder;
   const auto path = folder / "picture.png";
   write_png(path, image);
   const std::string bytes = test::read_bytes(path);
@@ -446,9 +449,7 @@ TEST(Png, IsWrittenAndReadBack) {
   for (std::size_t k = 0; k < image.rgb.size(); ++k) {
     ASSERT_EQ(read->rgba[k / 3 * 4 + k % 3], image.rgb[k]) << k;
   }
-  const auto files = std::filesystem::directory_iterator(folder);
-  EXPECT_EQ(std::distance(begin(files), end(files)), 1) << "no temporary file is left";
-  std::filesystem::remove_all(folder);
+  EXPECT_EQ(folder.names(), std::vector<std::string>{"picture.png"}) << "nothing else is left";
 }
 
 TEST(Png, MissingFolderIsAnError) {
