@@ -72,7 +72,7 @@ def line_of(text, place):
 
 def readme_is_short(pages):
     """README has few words, blocks of code apart."""
-    words = len(COMMENT.sub("", without_code(pages.text["README.md"])).split())
+    words = len(without_code(pages.text["README.md"]).split())
     if words > MOST_WORDS_OF_README:
         yield f"README.md: {words} words, at most {MOST_WORDS_OF_README}"
 

@@ -19,6 +19,16 @@ using test::expect_error;
 using test::random_nested_storage;
 using test::unaided_product;
 
+/// One matrix over patches of 1 m^2, each at its own position.
+HierarchicalStorage storage_without_blocks(std::size_t patch_count) {
+  HierarchicalStorage storage;
+  storage.area.assign(patch_count, 1.0F);
+  storage.patch.resize(patch_count);
+  std::iota(storage.patch.begin(), storage.patch.end(), 0U);
+  storage.matrix_count = 1;
+  return storage;
+}
+
 TEST(NestedOperator, TheTestOperatorHasClusterBasesOnAllSides) {
   int rows = 0, both = 0, diagonal = 0, neither = 0;
   const std::size_t positions = HierarchicalFormat::position_count(1000);
@@ -35,11 +45,7 @@ TEST(NestedOperator, TheTestOperatorHasClusterBasesOnAllSides) {
 TEST(NestedOperator, ClusterBasesAreTheProductsThatTheyStandFor) {
   // One block of rank one over the cluster coefficients of all positions but its own mirror
   // image's: Yhat = u v^T + v u^T with u = W D t and v = W D s, written out.
-  HierarchicalStorage storage;
-  storage.area.assign(64, 1.0F);
-  storage.patch.resize(64);
-  std::iota(storage.patch.begin(), storage.patch.end(), 0U);
-  storage.matrix_count = 1;
+  HierarchicalStorage storage = storage_without_blocks(64);
   std::vector<float> values;
   const auto take = [&](std::size_t count, auto value) {
     for (std::size_t k = 0; k < count; ++k) values.push_back(value(static_cast<float>(k)));
@@ -92,11 +98,7 @@ TEST(NestedOperator, ClusterBasesAreTheProductsThatTheyStandFor) {
 
 TEST(NestedOperator, ReceiversHaveTheLightOfClusterBasesThatBeginWithinARun) {
   // Three cells with 13, 12 and 7 cluster coefficients, and one block over all of them.
-  HierarchicalStorage storage;
-  storage.area.assign(64, 1.0F);
-  storage.patch.resize(64);
-  std::iota(storage.patch.begin(), storage.patch.end(), 0U);
-  storage.matrix_count = 1;
+  HierarchicalStorage storage = storage_without_blocks(64);
   std::vector<float> values;
   const auto take = [&](std::uint32_t count) {
     for (std::uint32_t k = 0; k < count; ++k) {
@@ -164,11 +166,7 @@ TEST(EquilibratedOperator, IsWhatItHoldsTimesTheScalesOfBothPatches) {
 
 TEST(EquilibratedOperator, FitsHalvesByItsScales) {
   constexpr std::uint32_t kSize = 32;
-  HierarchicalStorage storage;
-  storage.area.assign(kSize, 1.0F);
-  storage.patch.resize(kSize);
-  std::iota(storage.patch.begin(), storage.patch.end(), 0U);
-  storage.matrix_count = 1;
+  HierarchicalStorage storage = storage_without_blocks(kSize);
   storage.blocks.push_back({.row_count = kSize, .column_count = kSize});
   std::vector<float> values(kSize * kSize + HierarchicalFormat::kPadding);
   for (std::uint32_t i = 0; i < kSize; ++i) {
