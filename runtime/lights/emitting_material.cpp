@@ -1,5 +1,8 @@
 #include "runtime/lights/emitting_material.h"
 
+#include <map>
+#include <utility>
+
 #include "runtime/rays/float3_glm.h"
 
 namespace rebounce {
@@ -17,19 +20,20 @@ float area_of(const DisplayMesh& mesh, std::size_t t) {
 std::vector<std::uint32_t> find_emitting_material(const TransferData& data) {
   const DisplayMesh& mesh = data.mesh;
   std::vector<std::uint32_t> material(data.patches.size(), kNone);
-  std::vector<float> most(material.size(), 0.0F), covered(material.size());
-  for (std::uint32_t m = 0; m < data.materials.size(); ++m) {
+  if (data.materials.empty()) return material;  // data made in memory may have none
+  std::map<std::pair<std::uint32_t, std::uint32_t>, float> covered;  // by patch and material
+  for (std::size_t t = 0; t < mesh.triangle.size(); ++t) {
+    const std::uint32_t patch = mesh.triangle_patch[t], m = mesh.triangle_material[t];
+    if (patch == kNone || m >= data.materials.size()) continue;
     if (data.materials[m].emitted_luminance == Float3{0, 0, 0}) continue;
-    covered.assign(covered.size(), 0.0F);
-    for (std::size_t t = 0; t < mesh.triangle.size(); ++t) {
-      const std::uint32_t patch = mesh.triangle_patch[t];
-      if (patch != kNone && mesh.triangle_material[t] == m) covered[patch] += area_of(mesh, t);
-    }
-    for (std::size_t i = 0; i < covered.size(); ++i) {
-      if (covered[i] <= most[i]) continue;
-      most[i] = covered[i];
-      material[i] = m;
-    }
+    covered[{patch, m}] += area_of(mesh, t);
+  }
+  std::vector<float> most(material.size(), 0.0F);
+  for (const auto& [where, area] : covered) {
+    const auto [patch, m] = where;
+    if (area <= most[patch]) continue;
+    most[patch] = area;
+    material[patch] = m;
   }
   return material;
 }
