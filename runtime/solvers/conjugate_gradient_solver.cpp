@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "transfer/base/area_norm.h"
+
 namespace rebounce {
 namespace {
 
@@ -51,12 +53,12 @@ void ConjugateGradientSolver::begin(bool cold) {
   scale(sqrt_reflectance_, scaled_, symmetric_residual_);
   add_scaled({-1, -1, -1}, unknown_, symmetric_residual_);
   direction_ = symmetric_residual_;
-  residual_square_ = inner_product(symmetric_residual_, symmetric_residual_);
+  residual_square_ = area_inner_product(symmetric_residual_, symmetric_residual_, area_);
 }
 
 RadiositySolver::SweepReport ConjugateGradientSolver::sweep() {
   multiply_direction();
-  const Scalars curvature = inner_product(direction_, product_);
+  const Scalars curvature = area_inner_product(direction_, product_, area_);
   Scalars alpha{}, minus_alpha{};
   for (int c = 0; c < kChannelCount; ++c) {
     if (residual_square_[c] == 0) continue;  // this channel is solved
@@ -68,7 +70,7 @@ RadiositySolver::SweepReport ConjugateGradientSolver::sweep() {
   }
   add_scaled(alpha, direction_, unknown_);
   add_scaled(minus_alpha, product_, symmetric_residual_);
-  const Scalars next = inner_product(symmetric_residual_, symmetric_residual_);
+  const Scalars next = area_inner_product(symmetric_residual_, symmetric_residual_, area_);
   Scalars beta{};
   for (int c = 0; c < kChannelCount; ++c) {
     if (residual_square_[c] > 0) beta[c] = next[c] / residual_square_[c];
@@ -102,25 +104,14 @@ void ConjugateGradientSolver::multiply_direction() {
 
 double ConjugateGradientSolver::radiosity_residual_norm() const {
   // M0 + rho F B - B = R (R F B - U) = R times the residual of the symmetric system.
-  double sum = 0;
-  for (std::size_t i = 0; i < patch_count(); ++i) {
-    for (int c = 0; c < kChannelCount; ++c) {
-      const double residual = symmetric_residual_[i][c];
-      sum += static_cast<double>(area_[i]) * reflectance_[i][c] * residual * residual;
-    }
-  }
-  return std::sqrt(sum);
-}
-
-ConjugateGradientSolver::Scalars ConjugateGradientSolver::inner_product(
-    std::span<const Float3> a, std::span<const Float3> b) const {
   Scalars sum{};
   for (std::size_t i = 0; i < patch_count(); ++i) {
     for (int c = 0; c < kChannelCount; ++c) {
-      sum[c] += static_cast<double>(area_[i]) * a[i][c] * b[i][c];
+      const double residual = symmetric_residual_[i][c];
+      sum[c] += static_cast<double>(area_[i]) * reflectance_[i][c] * residual * residual;
     }
   }
-  return sum;
+  return std::sqrt(sum[0] + sum[1] + sum[2]);
 }
 
 }  // namespace rebounce

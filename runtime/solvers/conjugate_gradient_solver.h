@@ -28,7 +28,6 @@ class ConjugateGradientSolver final : public RadiositySolver {
   /// product_ = (I - R F R) direction_
   void multiply_direction();
   double radiosity_residual_norm() const;
-  Scalars inner_product(std::span<const Float3> a, std::span<const Float3> b) const;
 
   std::vector<Float3> sqrt_reflectance_;
   std::vector<Float3> unknown_, symmetric_residual_, direction_, product_, scaled_;
