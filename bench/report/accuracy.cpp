@@ -81,8 +81,12 @@ class AccuracyBench {
  private:
   /// What is timed: a contestant, and whether it starts in the dark.
   using Start = std::pair<std::size_t, bool>;
-  /// A timed run, and how many sweeps it makes.
+  /// A timed run, and how many sweeps it is asked for.
   using TimeKey = std::pair<Start, int>;
+  struct TimedRun {
+    int sweeps = 0;  ///< that it made; fewer than asked for where single precision ends
+    Timing timing{};
+  };
 
   /// A case's solution on the contestant's own form of F.
   const std::vector<Float3>& own_solution(const Contestant& contestant, std::size_t k) const {
@@ -165,7 +169,7 @@ class AccuracyBench {
 
   /// Adds the times, each found once for all rows that share it.
   void time(std::vector<AccuracyRow>& rows) const {
-    std::map<TimeKey, Timing> warm, cold;
+    std::map<TimeKey, TimedRun> warm, cold;
     for (const AccuracyRow& r : rows) {
       if (r.sweeps == 0) warm[{start_of(r), 0}] = {};
       for (const int sweeps : kTimedSweeps) {
@@ -185,21 +189,21 @@ class AccuracyBench {
   }
 
   /// Of a product as it was timed; of an iteration by the line through what was.
-  static Timing time_of(const AccuracyRow& row, const std::map<TimeKey, Timing>& times) {
-    if (row.sweeps == 0) return times.at({start_of(row), 0});
+  static Timing time_of(const AccuracyRow& row, const std::map<TimeKey, TimedRun>& times) {
+    if (row.sweeps == 0) return times.at({start_of(row), 0}).timing;
     std::map<int, double> by_sweeps;
     Timing result;
     for (const int sweeps : kTimedSweeps) {
-      const Timing& timing = times.at({start_of(row), sweeps});
-      by_sweeps[sweeps] = timing.median;
-      result.spread = std::max(result.spread, timing.spread);
+      const TimedRun& run = times.at({start_of(row), sweeps});
+      by_sweeps[run.sweeps] = run.timing.median;
+      result.spread = std::max(result.spread, run.timing.spread);
     }
     const RunTime line = fit(by_sweeps);
     result.median = line.start + row.sweeps * line.sweep;
     return result;
   }
 
-  void fill_in(std::map<TimeKey, Timing>& times, bool cold_caches) const {
+  void fill_in(std::map<TimeKey, TimedRun>& times, bool cold_caches) const {
     const char* phase = cold_caches ? "times with cold caches" : "times";
     if (!progress_(phase, 0)) throw Cancelled();
     ReadBuffer other_work(cold_caches ? kCacheBytes : 0);
@@ -208,13 +212,14 @@ class AccuracyBench {
       methods.push_back(contestant.make(contenders_));
     std::vector<TimedCase> timed;
     std::size_t begun = 0;
-    for (const auto& [key, unused] : times) {
+    for (auto& [key, timed_run] : times) {
       const auto [start, sweeps] = key;
       const auto [contestant, cold] = start;
       Method& method = *methods[contestant];
       const std::size_t k = cold ? 0 : static_cast<std::size_t>(settings_.lamp_count);
       timed.push_back(
-          {.work = [this, &method, k, sweeps = sweeps] { method.run(cases_[k].after, sweeps); },
+          {.work = [this, &method, k, sweeps = sweeps,
+                    &made = timed_run.sweeps] { made = method.run(cases_[k].after, sweeps); },
            .prepare =
                [this, &method, &other_work, &begun, &times, contestant = contestant, k, cold_caches,
                 phase] {
@@ -230,7 +235,7 @@ class AccuracyBench {
     const std::vector<Timing> found =
         time_interleaved(timed, {.rounds = settings_.repeats, .sample_seconds = kSampleSeconds});
     std::size_t k = 0;
-    for (auto& [key, timing] : times) timing = found[k++];
+    for (auto& [key, timed_run] : times) timed_run.timing = found[k++];
   }
 
   const Contenders& contenders_;

@@ -12,6 +12,7 @@
 #include "bench/support/program.h"
 #include "bench/support/timing.h"
 #include "precompute/cli/console.h"
+#include "rebounce/error.h"
 
 namespace rebounce::bench {
 namespace {
@@ -60,8 +61,7 @@ nlohmann::ordered_json provenance(const CommonOptions& options) {
           {"threads", thread_count(options)},
           {"compiler", machine.compiler},
           {"build_type", machine.build_type},
-          {"commit", machine.commit},
-          {"repeats", options.repeats}};
+          {"commit", machine.commit}};
 }
 
 /// Measures one scene with one number of patches into files of their own.
@@ -89,6 +89,7 @@ void run(const Options& options) {
     fmt::print("{}\n", provenance(options.common).dump(2));
     return;
   }
+  if (options.scenes.empty()) throw Error("there is nothing to measure; give a scene");
   cli::ProgressBar bar(true);
   std::filesystem::create_directories(options.folder);
   for (const std::string& scene : options.scenes) {
@@ -112,7 +113,7 @@ void add_options(CLI::App& app, Options& options) {
       ->check(CLI::Range(1, 4096))
       ->capture_default_str();
   app.add_option("--repeats", options.common.repeats,
-                 "Timings of each thing; 0: 7, or 3 with --quick")
+                 "Timings of each thing; 0: 7, 5 from 3,000 patches, 3 from 10,000 and with --quick")
       ->check(CLI::Range(0, 100000))
       ->capture_default_str();
   add_threads_option(app, options.common)

@@ -106,6 +106,7 @@ Lag lag_after(const std::vector<int>& switches, const std::vector<float>& errors
     const int end = k + 1 < switches.size() ? switches[k + 1] : static_cast<int>(errors.size());
     int frame = switches[k];
     while (frame < end && errors[frame] > threshold) ++frame;
+    if (frame == end) ++lag.never;
     const int frames = frame - switches[k];
     lag.mean += static_cast<double>(frames) / static_cast<double>(switches.size());
     lag.worst = std::max(lag.worst, frames);

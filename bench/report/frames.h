@@ -14,6 +14,7 @@ namespace rebounce::bench {
 struct Lag {
   double mean = 0;
   int worst = 0;
+  int never = 0;  ///< switches before whose next one the error does not fall below
 };
 
 /// What a method that has so many microseconds for each frame makes of a light path.

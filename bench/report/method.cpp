@@ -4,6 +4,7 @@
 #include <array>
 
 #include "rebounce/error.h"
+#include "transfer/base/argument_check.h"
 #include "transfer/base/reflection.h"
 #include "transfer/exchange/relaxation.h"
 
@@ -24,9 +25,11 @@ class ProductMethod final : public Method {
         workspace_(transfer.workspace_size()) {}
 
   using Method::run;
-  void run(std::span<const Float3> initial_exitance, int /*sweeps*/, double /*residual*/) override {
+  int run(std::span<const Float3> initial_exitance, int /*sweeps*/, double /*residual*/) override {
+    check_light_of_patches("the report: the initial exitance", initial_exitance);  // as solvers do
     transfer_.apply(initial_exitance, radiosity_, workspace_);
     add_reflected(initial_exitance, reflectance_, radiosity_, radiosity_);
+    return 0;
   }
   std::span<const Float3> radiosity() const override { return radiosity_; }
   bool iterates() const override { return false; }
@@ -47,9 +50,10 @@ class IterativeMethod final : public Method {
   explicit IterativeMethod(std::unique_ptr<RadiositySolver> solver) : solver_(std::move(solver)) {}
 
   using Method::run;
-  void run(std::span<const Float3> initial_exitance, int sweeps, double residual) override {
-    solver_->solve(initial_exitance,
-                   {.max_sweeps = sweeps, .residual = residual, .measure_residual = false});
+  int run(std::span<const Float3> initial_exitance, int sweeps, double residual) override {
+    const SolveSettings settings{
+        .max_sweeps = sweeps, .residual = residual, .measure_residual = false};
+    return solver_->solve(initial_exitance, settings).sweeps;
   }
   std::span<const Float3> radiosity() const override { return solver_->radiosity(); }
   bool iterates() const override { return true; }
@@ -84,24 +88,38 @@ void add_products(const Contenders& contenders, std::vector<Contestant>& list) {
   }
 }
 
-/// What one sweep of a method reads of F, bytes; what it reads twice counts twice.
-std::size_t bytes_per_sweep(SolveMethod method, const Form& form) {
-  const FormFactorOperator& form_factors = *form.form_factors;
-  const bool symmetric = method == SolveMethod::kSymmetricGaussSeidel;
-  if (method != SolveMethod::kGaussSeidel && !symmetric) return form_factors.bytes_per_gather();
+/// How often a method reads all of F.
+struct Reads {
+  std::size_t sweep = 1, cold_start = 0, warm_start = 0;
+};
+
+Reads reads_of(SolveMethod method, const FormFactorOperator& form_factors) {
+  if (method == SolveMethod::kGathering) return {};
+  if (method == SolveMethod::kConjugateGradient) return {.cold_start = 1, .warm_start = 2};
   const auto relaxation = dynamic_cast<const SweepableFormFactors&>(form_factors).make_relaxation();
-  return form_factors.bytes() *
-         relaxation->reads_per_sweep(symmetric ? SweepOrder::kSymmetric : SweepOrder::kForward);
+  const auto forward = static_cast<std::size_t>(relaxation->reads_per_sweep(SweepOrder::kForward));
+  if (method == SolveMethod::kGaussSeidel) return {.sweep = forward};
+  const auto both =
+      static_cast<std::size_t>(relaxation->reads_per_sweep(SweepOrder::kSymmetric));
+  // The first sweep finds what later ones keep from the sweep before.
+  return {.sweep = both, .cold_start = forward - both, .warm_start = forward - both};
 }
 
 Contestant iteration(SolveMethod method, const Form& form) {
+  const FormFactorOperator& form_factors = *form.form_factors;
   const std::string name = form.name == kLinks && method == SolveMethod::kGathering
                                ? "hierarchical radiosity"
                                : name_of(method);
+  const bool gathers =
+      method == SolveMethod::kGathering || method == SolveMethod::kConjugateGradient;
+  const std::size_t read = gathers ? form_factors.bytes_per_gather() : form_factors.bytes();
+  const Reads reads = reads_of(method, form_factors);
   return {.name = name,
           .form = form.name,
-          .bytes = form.form_factors->bytes(),
-          .bytes_read = bytes_per_sweep(method, form),
+          .bytes = form_factors.bytes(),
+          .bytes_read = reads.sweep * read,
+          .bytes_of_cold_start = reads.cold_start * read,
+          .bytes_of_warm_start = reads.warm_start * read,
           .method = method};
 }
 
@@ -141,6 +159,7 @@ void add_refinements(const Contenders& contenders, const ReportSettings& setting
                       .form = form,
                       .bytes = transfer.bytes() + form_factors.bytes(),
                       .bytes_read = transfer.bytes_per_apply() + form_factors.bytes_per_gather(),
+                      .bytes_of_warm_start = form_factors.bytes_per_gather(),
                       .method = SolveMethod::kRefine});
     }
   }

@@ -16,10 +16,11 @@ class Method {
   virtual ~Method() = default;
 
   /// Finds the radiosity for `initial_exitance` [n] in lx, by `sweeps` sweeps where it iterates; by
-  /// fewer where it believes the residual to be below `residual` (SolveSettings) before.
-  virtual void run(std::span<const Float3> initial_exitance, int sweeps, double residual) = 0;
-  void run(std::span<const Float3> initial_exitance, int sweeps) {
-    run(initial_exitance, sweeps, 0);
+  /// fewer where it believes the residual to be below `residual` (SolveSettings) before, or where
+  /// single precision reaches no further. Returns how many it made; a product makes none.
+  virtual int run(std::span<const Float3> initial_exitance, int sweeps, double residual) = 0;
+  int run(std::span<const Float3> initial_exitance, int sweeps) {
+    return run(initial_exitance, sweeps, 0);
   }
 
   /// The last solution [n] in lx; valid until the next run.
@@ -39,8 +40,10 @@ struct Contestant {
   std::string transfer{};  ///< which operator it has; empty: none
   std::string form{};      ///< which form of F it has; empty: none
   std::size_t bytes = 0;   ///< of them
-  std::size_t bytes_read =
-      0;  ///< that a product or a sweep reads of them, what is read twice twice
+  /// That a product or a sweep reads of them; what is read twice counts twice.
+  std::size_t bytes_read = 0;
+  /// That the start of a run reads of them beside its sweeps.
+  std::size_t bytes_of_cold_start = 0, bytes_of_warm_start = 0;
 
   /// Of the named method; `product`: one product with the operator instead.
   SolveMethod method = SolveMethod::kGathering;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "bench/support/light_changes.h"
+#include "rebounce/error.h"
 #include "runtime/frame/engine_parts.h"
 #include "runtime/outputs/vertex_light.h"
 #include "runtime/rays/box.h"
@@ -31,6 +32,7 @@ TwoPlaces place_lamps(const Contenders& contenders, std::uint64_t seed) {
   const TransferData& data = *contenders.data;
   const double diagonal = box_around(data.mesh.position).diagonal();
   const auto places = lamps_in_the_open(data, *contenders.tracer, 8 * kLampCount, seed);
+  if (places.size() < 2 * kMovingCount) throw Error("the report finds no places for its lamps");
   TwoPlaces result;
   for (std::size_t k = 0; k < kLampCount; ++k) {
     const auto lamp_at = [&](std::size_t place) {
@@ -57,7 +59,6 @@ RestOfFrame measure_rest_of_frame(const Contenders& contenders, const ReportSett
                     [&] {
                       engine.parts().compute_direct(lamps.next(), {});
                       engine.parts().compute_initial_exitance();
-                      engine.parts().compute_radiosity();
                     }},
       TimedCase{.work =
                     [&] {

@@ -5,10 +5,11 @@
 
 namespace rebounce::bench {
 
-/// What a frame costs beside the solution for the light of the patches, whichever method finds it.
+/// What a frame costs beside the solution for the light of the patches, whichever method finds it:
+/// every method's own time ends with radiosity.
 struct RestOfFrame {
   /// Direct light of four lamps, a point and a spot that moved, a sphere and a rectangle that did
-  /// not; initial exitance; radiosity.
+  /// not; initial exitance.
   Timing direct;
   Timing outputs;  ///< light at the vertices of the display mesh
 };

@@ -1,5 +1,6 @@
 #include "bench/support/read_buffer.h"
 
+#include <omp.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -63,15 +64,15 @@ ReadBuffer::ReadBuffer(std::size_t bytes)
 }
 
 void ReadBuffer::read() {
-  constexpr std::size_t kPart = 4096;  // lines per share of work: 256 KiB
   const SumLines sum_of = widest_sum();
-  const std::size_t parts = (lines_.size() + kPart - 1) / kPart;
   std::uint64_t sum = 0;
-#pragma omp parallel for schedule(static) reduction(+ : sum)
-  for (std::size_t part = 0; part < parts; ++part) {
-    const std::size_t begin = part * kPart;
-    const std::size_t count = lines_.size() - begin < kPart ? lines_.size() - begin : kPart;
-    sum += sum_of(reinterpret_cast<const Line*>(lines_.data() + begin), count);
+#pragma omp parallel reduction(+ : sum)
+  {
+    const auto thread = static_cast<std::size_t>(omp_get_thread_num());
+    const auto threads = static_cast<std::size_t>(omp_get_num_threads());
+    const std::size_t begin = lines_.size() * thread / threads;
+    const std::size_t end = lines_.size() * (thread + 1) / threads;
+    sum += sum_of(reinterpret_cast<const Line*>(lines_.data() + begin), end - begin);
   }
   sum_ += sum;
 }

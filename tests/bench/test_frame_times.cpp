@@ -13,7 +13,9 @@ TEST(LagAfter, CountsFramesUntilTheErrorIsSmall) {
   const Lag lag = lag_after({1, 5}, errors, 0.01);
   EXPECT_DOUBLE_EQ(lag.mean, 2.5);  // two, and three until the end
   EXPECT_EQ(lag.worst, 3);
+  EXPECT_EQ(lag.never, 1);
   EXPECT_EQ(lag_after({4}, errors, 0.01).worst, 0);
+  EXPECT_EQ(lag_after({1}, {0, 0.5F, 0.001F}, 0.01).never, 0);
 }
 
 TEST(RunTimes, AreALineThroughWhatWasMeasuredThatOutliersDoNotTurn) {
