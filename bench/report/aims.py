@@ -1,7 +1,8 @@
 """The aims, and what was measured of them."""
 
 import claims as claims_module
-from formats import name_of, span, times
+import formats
+from formats import name_of, number, span, times
 from results import SWITCHED, moved, percent
 
 AIM_ERROR = 0.001
@@ -61,16 +62,21 @@ class Headline:
             times(self.switch_compressed),
             times(self.warm_compressed),
             *(
-                f"{lag.inverse_value:.1f} / {lag.rival_value:.1f}" if lag else "–"
-                for lag in (self.lag, self.fine_lag)
+                " / ".join(formats.lag(*side) for side in sides_of(c)) if c else "–"
+                for c in (self.lag, self.fine_lag)
             ),
         )
+
+
+def sides_of(claim):
+    """The lags of the inverse and of its rival, each with the switches that never get there."""
+    return (claim.inverse_value, claim.inverse_never), (claim.rival_value, claim.rival_never)
 
 
 def time_and_size(microseconds, size):
     return (
         "–" if microseconds is None else f"{microseconds:,.0f}",
-        "–" if not size else f"{size / 1e6:.3g}",
+        "–" if not size else number(size / 1e6),
     )
 
 
@@ -137,9 +143,17 @@ def lag_line(error, lags):
     lags = [c for c in lags if c is not None]
     if not lags:
         return []
-    return [
+    reached = [[frames for frames, never in side if not never] for side in zip(*map(sides_of, lags))]
+    left_out = [len(lags) - len(side) for side in reached]
+    line = (
         f"- Frames after a switch until the error is within {error}, at {TIGHTEST_BUDGET} µs a frame: "
-        f"{span([c.inverse_value for c in lags])} with the inverse, {span([c.rival_value for c in lags])} with "
+        f"{span(reached[0])} with the inverse, {span(reached[1])} with "
         f"Gauss-Seidel, which needs {AIM_LAG} or more in {sum(c.rival_value >= AIM_LAG for c in lags)} of "
         f"{len(lags)} cases."
-    ]
+    )
+    if any(left_out):
+        line += (
+            f" Cases in which some switch never gets there are in no span: {left_out[0]} of the inverse, "
+            f"{left_out[1]} of Gauss-Seidel."
+        )
+    return [line]

@@ -48,9 +48,9 @@ class Measured:
 class Report:
     """The claims of one file."""
 
-    def __init__(self, path):
+    def __init__(self, path, text):
         self.path = path
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = text.splitlines()
         self.notes = [line.removeprefix("# ") for line in lines if line.startswith("#")]
         claims = [claim_of(row) for row in csv.DictReader(l for l in lines if not l.startswith("#"))]
         subjects = dict.fromkeys((claim.scene, claim.patches) for claim in claims)
@@ -71,20 +71,24 @@ def claim_of(row):
     values["patches"] = int(values["patches"])
     for name in ("inverse_value", "rival_value"):
         values[name] = float(values[name])
-    for name in ("inverse_bytes", "rival_bytes"):
+    for name in ("inverse_bytes", "rival_bytes", "inverse_never", "rival_never"):
         values[name] = int(values[name]) if values[name] else None
     return claims_module.Claim(**values)
 
 
-def reports(root=ROOT):
-    found = [Report(path) for path in sorted(root.glob(RESULTS))]
+def reports(root, changed):
+    """One for each machine; `changed` are results that are still to be written, text by path."""
+    texts = {path: path.read_text(encoding="utf-8") for path in root.glob(RESULTS)} | changed
+    found = [Report(path, text) for path, text in sorted(texts.items())]
     if not found:
         raise SystemExit(f"there is no {RESULTS}; ./dev report --keep makes one")
     return found
 
 
 def duration(microseconds):
-    return f"{microseconds:.0f} µs" if microseconds < 100 else f"{microseconds / 1000:.2g} ms"
+    if microseconds < 99.5:
+        return f"{microseconds:.0f} µs"
+    return f"{microseconds / 1000:{'.2g' if microseconds < 99500 else ',.0f'}} ms"
 
 
 def readme_line(report):
@@ -94,16 +98,17 @@ def readme_line(report):
     )
     if shown is None:
         raise SystemExit(f"{report.path} has no {SCENE} of {PATCHES:,} patches; ./dev report --keep writes it anew")
-    patches = [h.result.patches for h in report.headlines]
-    scenes = {h.result.scene for h in report.headlines}
-    switches = [h.switch for h in report.headlines if h.switch is not None]
+    switched = [h for h in report.headlines if h.switch is not None]
+    patches = [h.result.patches for h in switched]
+    scenes = {h.result.scene for h in switched}
+    switches = [h.switch for h in switched]
     repainted = [r for h in report.headlines if (r := aims.ratio_of(h.claims, "equal error", summary.REPAINTED))]
     return (
         f"**Figures.** {SCENE.replace('_', ' ').capitalize()}, {PATCHES:,} patches, one thread of an "
         f"{report.processor}: the bounced light of a lamp that was just switched on takes "
         f"{times_to(shown, COARSE)} and {times_to(shown, FINE)} of the exact solution on these patches. "
         f"A whole frame to {results.percent(COARSE)} takes {duration(frame_of(shown, COARSE))}. "
-        f"Over {len(scenes)} scenes of {min(patches):,} to {max(patches):,} patches, "
+        f"In {len(switched)} cases ({len(scenes)} scenes, {min(patches):,} to {max(patches):,} patches), "
         f"to {results.percent(aims.AIM_ERROR)}, the product is {span(switches)} times faster than Gauss-Seidel (median {times(statistics.median(switches))}), "
         f"{span([h.warm for h in report.headlines])} times after a lamp moved a little, and "
         f"{span([h.switch_any for h in report.headlines])} times faster than the best iteration of any kind. "
@@ -154,15 +159,17 @@ def with_line(readme, line):
     return f"{before}{begin}\n{line}\n{end}{after}"
 
 
-def pages(root=ROOT):
+def pages(root=ROOT, changed=None):
     """The text of each file that is written here."""
-    found = reports(root)
+    found = reports(root, changed or {})
     readme = (root / README).read_text(encoding="utf-8")
     return {PAGE: page(found, root), README: with_line(readme, readme_line(found[0]))}
 
 
-def write(root=ROOT):
-    for path, text in pages(root).items():
+def write(root=ROOT, changed=None):
+    """Writes the pages and the results that are `changed`, once the text of all of them is there."""
+    for path, text in ((changed or {}) | pages(root, changed)).items():
+        (root / path).parent.mkdir(parents=True, exist_ok=True)
         (root / path).write_text(text, encoding="utf-8")
 
 

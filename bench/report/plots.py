@@ -7,6 +7,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import claims
+import formats
 import results
 
 # One colour for each method in every figure.
@@ -102,6 +103,7 @@ def winners(all_results, path):
     figure, axes = plt.subplots(
         1, len(all_results), figsize=(3.2 * len(all_results), 4), squeeze=False, layout="constrained"
     )
+    labelled = None
     for panel, result in zip(axes[0], all_results):
         changes = [c for c in result.changes() if c != results.REPAINTED]
         ratio = np.full((len(changes), len(results.TARGETS)), np.nan)
@@ -110,10 +112,11 @@ def winners(all_results, path):
                 claim = claims.equal_error(result, change, target)
                 if claim is not None:
                     ratio[y, x] = claim.ratio
-                    panel.text(x, y, f"{claim.ratio:.3g}"[:4].rstrip("."), ha="center", va="center", fontsize=8)
+                    panel.text(x, y, formats.times(claim.ratio), ha="center", va="center", fontsize=8)
         panel.imshow(np.log2(ratio), cmap="RdBu_r", vmin=-4, vmax=4, aspect="auto")
         panel.set_xticks(range(len(results.TARGETS)), [f"{t:g}" for t in results.TARGETS])
-        panel.set_yticks(range(len(changes)), changes if panel is axes[0][0] else [])
+        panel.set_yticks(range(len(changes)), changes if changes != labelled else [])
+        labelled = changes
         panel.set_xlabel("error")
         panel.set_title(result.title, fontsize=8)
     return save(figure, path)

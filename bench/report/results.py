@@ -116,6 +116,16 @@ def with_infinity(row):
     return {k: math.inf if v is None else v for k, v in row.items()} | {"errors": errors}
 
 
+def lag_of(row, key):
+    """Mean frames from a switch to an error, infinite if no switch reached it before the next one;
+    and the number of switches that did not, which count as the frames up to the next."""
+    lag = row[key]
+    never = lag.get("never", 0)
+    # It is as far from each switch to the next, so that the mean is the worst if none reached it.
+    none = never and math.isclose(lag["mean"], lag["worst"])
+    return math.inf if none else lag["mean"], never
+
+
 def describe(row):
     """How a row did it: "gauss-seidel, compressed 0.1 %, 3 sweeps"; after a switch iterations may
     start in the dark, "3 sweeps from zero"."""

@@ -1,6 +1,7 @@
 """The tables of the report: their columns, and a row for each thing."""
 
 import claims as claims_module
+import formats
 import results as results_module
 from aims import ratio_of
 from formats import name_of, number, times
@@ -26,7 +27,18 @@ def losses(headlines, subjects):
     return sorted(claims, key=lambda c: c.ratio)
 
 
-TIME_SUBJECTS = ("equal error",)
+def condition_of(claim):
+    return claim.condition + (", cold caches" if "cold caches" in claim.subject else "")
+
+
+def time_losses(headlines):
+    """The conditions in which an iteration of any kind is as fast or faster, each with the fastest."""
+    claims = {}
+    for c in losses(headlines, ("equal error",)):
+        claims.setdefault((c.scene, c.patches, condition_of(c)), c)
+    return list(claims.values())
+
+
 PATH_SUBJECTS = ("light path",)
 
 
@@ -35,7 +47,7 @@ def loss_rows(claims):
         (
             name_of(c),
             f"{c.patches:,}",
-            c.condition + (", cold caches" if "cold caches" in c.subject else ""),
+            condition_of(c),
             c.inverse,
             number(c.inverse_value),
             c.rival,
@@ -43,7 +55,6 @@ def loss_rows(claims):
             times(c.ratio),
         )
         for c in claims
-        if "any iteration" not in c.subject
     ]
 
 
@@ -70,13 +81,17 @@ PATH_LOSS_NAMES = ("scene", "patches", "path", "budget", "inverse", "error", "Ga
 
 
 def largest_motion(headline, target):
-    """The largest motion, a part of the diagonal, at which Gauss-Seidel is as fast; 0: none."""
-    largest = 0.0
-    for motion in claims_module.motions(headline.claims):
-        ratio = ratio_of(headline.claims, "equal error", f"{moved(motion)}, error {target:g}")
-        if ratio is not None and ratio <= 1:
-            largest = max(largest, motion)
-    return largest
+    """The largest motion, a part of the diagonal, at which Gauss-Seidel is as fast; if there is none,
+    the smallest that both sides were measured at, or –."""
+    ratios = {
+        motion: ratio
+        for motion in claims_module.motions(headline.claims)
+        if (ratio := ratio_of(headline.claims, "equal error", f"{moved(motion)}, error {target:g}"))
+    }
+    lost = [motion for motion, ratio in ratios.items() if ratio <= 1]
+    if lost:
+        return percent(max(lost))
+    return f"none from {percent(min(ratios))}" if ratios else "–"
 
 
 def motion_rows(headlines):
@@ -84,7 +99,7 @@ def motion_rows(headlines):
         (
             name_of(h.result),
             f"{h.result.patches:,}",
-            *(percent(m) if (m := largest_motion(h, t)) else "none" for t in results_module.TARGETS),
+            *(largest_motion(h, t) for t in results_module.TARGETS),
         )
         for h in headlines
     ]
@@ -132,7 +147,7 @@ def frame_rows(result, budget=PATH_BUDGET):
             if row is None:
                 rows.append((path, label, "does not fit", "", "", "", ""))
                 continue
-            lag = row.get("lag_1_percent")
+            key = "lag_1_percent"
             rows.append(
                 (
                     path,
@@ -141,7 +156,7 @@ def frame_rows(result, budget=PATH_BUDGET):
                     f"{row['error_mean']:.1e}",
                     f"{row['error_p95']:.1e}",
                     f"{row['error_worst']:.1e}",
-                    f"{lag['mean']:.1f}" if lag else "",
+                    formats.lag(*results_module.lag_of(row, key)) if key in row else "",
                 )
             )
     return rows

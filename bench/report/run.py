@@ -6,6 +6,7 @@
 
 import argparse
 import datetime
+import hashlib
 import json
 import pathlib
 import re
@@ -13,6 +14,7 @@ import signal
 import subprocess
 import sys
 import time
+import urllib.parse
 
 import aims
 import claims as claims_module
@@ -57,8 +59,10 @@ def parse_arguments():
         help="put the claims into bench/results/, and what they say into notes/ and README.md",
     )
     options = parser.parse_args()
-    if options.keep and (options.quick or options.only or options.sizes):
-        parser.error("--keep is for the whole report; leave out --quick, --only and --sizes")
+    partial = ("scenes", "quick", "only", "sizes", "repeats", "no_truth")
+    if options.keep and any(getattr(options, name) for name in partial):
+        parser.error("--keep is for the whole report; leave out scenes, --quick, --only, --sizes, "
+                     "--repeats and --no-truth")
     return options
 
 
@@ -68,10 +72,21 @@ class Job:
     def __init__(self, scene, patches, folder):
         self.scene, self.patches = pathlib.Path(scene), patches
         self.result = folder / f"{self.scene.stem}-{patches}.json"
+        self.conditions = self.result.with_suffix(".conditions.json")
 
-    @property
-    def name(self):
-        return self.scene.stem
+    def __str__(self):
+        return f"{self.scene.stem} at {self.patches:,}"
+
+    def load(self):
+        """Its result and the conditions under which it was made; None, None if they are not there."""
+        try:
+            result, conditions = (
+                json.loads(path.read_text(encoding="utf-8")) for path in (self.result, self.conditions)
+            )
+        except (OSError, ValueError):
+            return None, None
+        same = all(result.get(key) == value for key, value in conditions["program"].items())
+        return (result, conditions) if same else (None, None)
 
 
 def list_scenes(options):
@@ -100,13 +115,39 @@ def list_jobs(options, folder):
     return jobs
 
 
-def finished(job, commit):
-    """Its result if it is there and of this commit, else None."""
+def settings_of(options):
+    return ["--threads", str(options.threads), "--repeats", str(options.repeats)]
+
+
+def hash_of(scene):
+    """Of the contents of a scene and of the files that a .gltf names; None if one is missing, as
+    bench_report will say."""
     try:
-        result = json.loads(job.result.read_text(encoding="utf-8"))
-        return result if result["commit"] == commit else None
-    except (OSError, ValueError, KeyError):
+        text = scene.read_bytes()
+        digest = hashlib.sha256(text)
+        for name in files_of(json.loads(text)) if scene.suffix == ".gltf" else ():
+            digest.update((scene.parent / urllib.parse.unquote(name)).read_bytes())
+        return digest.hexdigest()
+    except (OSError, ValueError):
         return None
+
+
+def files_of(gltf):
+    parts = gltf.get("buffers", []) + gltf.get("images", [])
+    return [part["uri"] for part in parts if not part.get("uri", "data:").startswith("data:")]
+
+
+def conditions_of(job, options, program):
+    """What a result depends on; `program` is the bench as it describes itself."""
+    many = program["commit"] == "unknown" or program["commit"].endswith("-modified")
+    return {
+        "program": program,
+        "bench": hash_of(options.bench) if many else None,  # a clean commit has one
+        "quick": options.quick,
+        "repeats": options.repeats,
+        "truth": not options.no_truth,
+        "scene": hash_of(job.scene),
+    }
 
 
 def usual_seconds(patches, quick):
@@ -128,26 +169,40 @@ def readable(seconds):
     return f"{seconds:.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"
 
 
-def measure(job, options, folder):
+def measure(job, conditions, options, folder):
     command = [options.bench, job.scene, "--patches", str(job.patches), "--output", folder]
-    command += ["--threads", str(options.threads), "--repeats", str(options.repeats)]
+    command += settings_of(options)
     if options.quick:
         command.append("--quick")
     if options.no_truth:
         command.append("--no-truth")
+    job.conditions.unlink(missing_ok=True)
     process = subprocess.Popen([str(word) for word in command])
     try:
-        return process.wait() == 0
+        if process.wait() != 0:
+            return False
     except KeyboardInterrupt:
         process.send_signal(signal.SIGINT)  # a terminal has sent it already; twice does no harm
         process.wait()
         raise
+    job.conditions.write_text(json.dumps(conditions, indent=1) + "\n", encoding="utf-8")
+    return True
 
 
-def measure_all(jobs, options, folder, commit):
+def measure_all(jobs, options, folder):
     """Measures what is not finished; returns the jobs that are, in the end."""
-    waiting = [job for job in jobs if not finished(job, commit)]
-    done = [(job.patches, r["seconds"]) for job in jobs if (r := finished(job, commit))]
+    described = subprocess.run(
+        [options.bench, "--describe", *settings_of(options)], capture_output=True, check=True
+    )
+    program = json.loads(described.stdout)
+    conditions = {job: conditions_of(job, options, program) for job in jobs}
+
+    def result_of(job):
+        result, made = job.load()
+        return result if made == conditions[job] else None
+
+    done = [(job.patches, r["seconds"]) for job in jobs if (r := result_of(job))]
+    waiting = [job for job in jobs if not result_of(job)]
     total = sum(estimate(job, done, options.quick) for job in waiting)
     print(f"{len(jobs) - len(waiting)} measurements are there, {len(waiting)} to make: "
           f"about {readable(total)} on two idle cores", flush=True)
@@ -156,15 +211,14 @@ def measure_all(jobs, options, folder, commit):
         seconds = estimate(job, done, options.quick)
         spent = time.monotonic() - begun
         if options.minutes and spent + seconds > 60 * options.minutes:
-            print(f"{job.name} at {job.patches:,}: about {readable(seconds)}, left out", flush=True)
+            print(f"{job}: about {readable(seconds)}, left out", flush=True)
             continue
-        print(f"[{k + 1}/{len(waiting)}] {job.name} at {job.patches:,}: about {readable(seconds)}",
-              flush=True)
-        if not measure(job, options, folder):
-            print(f"{job.name} at {job.patches:,} failed, and is left out", file=sys.stderr)
+        print(f"[{k + 1}/{len(waiting)}] {job}: about {readable(seconds)}", flush=True)
+        if not measure(job, conditions[job], options, folder):
+            print(f"{job} failed, and is left out", file=sys.stderr)
             continue
-        done.append((job.patches, finished(job, commit)["seconds"]))
-    return [job for job in jobs if finished(job, commit)]
+        done.append((job.patches, result_of(job)["seconds"]))
+    return [job for job in jobs if result_of(job)]
 
 
 def draw(headlines, folder):
@@ -208,8 +262,9 @@ def write_page(headlines, missing, date, pictures, folder):
         page.table(*claim_table(h), f"Equal error: {h.result.title}")
     page.heading("Where Gauss-Seidel wins")
     page.table(rows.MOTION_NAMES, rows.motion_rows(headlines), "Up to a motion of")
-    slow = rows.losses(headlines, rows.TIME_SUBJECTS)
-    page.table(rows.LOSS_NAMES, rows.loss_rows(slow), "As fast or faster")
+    slow = rows.time_losses(headlines)
+    page.table(rows.LOSS_NAMES, rows.loss_rows(slow),
+               f"An iteration of any kind is as fast or faster: {len(slow)} conditions")
     paths = rows.losses(headlines, rows.PATH_SUBJECTS)
     page.table(rows.PATH_LOSS_NAMES, rows.path_loss_rows(paths), "Less error on a light path")
     page.heading("Light paths")
@@ -265,19 +320,50 @@ def write_summary(headlines, missing, date, pictures, folder):
     (folder / "report.md").write_text(text, encoding="utf-8")
 
 
-def keep_results(headlines, date, folder):
-    """The claims, with the other tables of this machine."""
+def why_not_kept(jobs, done):
+    """Why the results are not a whole report by one program, or None."""
+    missing = ", ".join(str(job) for job in jobs if job not in done)
+    if missing:
+        return f"missing are {missing}"
+    made = [job.load()[1] for job in jobs]
+    if None in made:
+        return "of some results it is not known how they were made; measure them again"
+    if any(m != made[0] | {"scene": m["scene"]} for m in made):
+        return "the results are of several programs, machines or settings; measure them again"
+    if made[0]["repeats"] or not made[0]["truth"]:
+        return "the results were made with --repeats or --no-truth"
+    return None
+
+
+def sizes_line(headlines):
+    """Which sizes of which scenes there are."""
+    sizes = {}
+    for h in headlines:
+        sizes.setdefault(formats.name_of(h.result), []).append(f"{h.result.patches:,}")
+    return "patches: " + "; ".join(f"{scene} {', '.join(counts)}" for scene, counts in sizes.items())
+
+
+def kept_claims(headlines, date, folder):
+    """The file of the claims on this machine, and its text."""
     result = headlines[0].result
     machine = re.sub(r"[^a-z0-9]+", "-", result["processor"].lower()).strip("-")
-    target = ROOT / "bench" / "results" / machine
-    target.mkdir(parents=True, exist_ok=True)
     lines = (
         f"# bench_report, commit {result['commit']}, {date}\n"
         f"# {result['processor']}, {result['processors']} processors, {result['threads']} threads; "
         f"{result['compiler']}, {result['build_type']}\n"
+        f"# {sizes_line(headlines)}\n"
     )
     claims = (folder / "claims.csv").read_text(encoding="utf-8")
-    (target / "report.csv").write_text(lines + claims, encoding="utf-8")
+    return {ROOT / "bench" / "results" / machine / "report.csv": lines + claims}
+
+
+def keep(jobs, done, headlines, date, folder):
+    """Writes what is kept, if the report is whole; returns the exit code."""
+    if reason := why_not_kept(jobs, done):
+        print(f"Nothing is kept: {reason}.", file=sys.stderr)
+        return 1
+    performance.write(changed=kept_claims(headlines, date, folder))
+    return 0
 
 
 def main():
@@ -291,17 +377,15 @@ def main():
     if options.page_only:
         done = [job for job in jobs if job.result.exists()]
     else:
-        described = subprocess.run([options.bench, "--describe"], capture_output=True, check=True)
-        commit = json.loads(described.stdout)["commit"]
         try:
-            done = measure_all(jobs, options, folder, commit)
+            done = measure_all(jobs, options, folder)
         except KeyboardInterrupt:
             print("\nStopped. What is finished is kept; run the same again to go on.", file=sys.stderr)
             return 130
     if not done:
         print("There is nothing to report.", file=sys.stderr)
         return 1
-    missing = [(job.name, job.patches) for job in jobs if job not in done]
+    missing = [job for job in jobs if job not in done]
     date = datetime.date.today().isoformat()
     measured = results_module.load(job.result for job in done)
     headlines = [aims.Headline(r, claims_module.all_claims(r)) for r in measured]
@@ -312,11 +396,8 @@ def main():
     pictures = draw(headlines, drawn)
     write_page(headlines, missing, date, pictures, folder)
     write_summary(headlines, missing, date, pictures, folder)
-    if options.keep:
-        keep_results(headlines, date, folder)
-        performance.write()
     print(f"\n{aims.aims(headlines)}\n\n{folder / 'report.html'}")
-    return 0
+    return keep(jobs, done, headlines, date, folder) if options.keep else 0
 
 
 if __name__ == "__main__":

@@ -1,5 +1,7 @@
 """The report in words: a Markdown file, and the parts of it that claims alone give."""
 
+import statistics
+
 import rows
 from aims import (
     AIM_ERROR,
@@ -22,15 +24,19 @@ def provenance(results, date):
     return (
         f"{r['processor']}, {r['processors']} processors; {r['compiler']}, {r['build_type']}; "
         f"commit {commits}; {date}. Offline work on {r['threads']} threads, relighting on "
-        f"{r['settings']['solve_threads']}. Times are medians of {r['settings']['repeats']} rounds in "
+        f"{r['settings']['solve_threads']}. Times are medians of {setting(results, 'repeats')} rounds in "
         f"which all methods take turns; median spread of a time (interquartile range ÷ median) "
         f"{percent(round(median_spread(results), 3))}."
     )
 
 
+def setting(results, key):
+    """A setting, or the least and the greatest where results differ in it."""
+    return span([r["settings"][key] for r in results], str)
+
+
 def median_spread(results):
-    spreads = sorted(row["spread"] for r in results for row in r["accuracy"])
-    return spreads[len(spreads) // 2]
+    return statistics.median(row["spread"] for r in results for row in r["accuracy"])
 
 
 METHOD = """Errors are of the light that patches reflect after it came from other patches, B − M0: relative,
@@ -51,7 +57,7 @@ scene's own emitters are dark. Of the light that patches then give off, a tenth 
 def missing_line(missing):
     if not missing:
         return ""
-    return "\n**Missing:** " + ", ".join(f"{s.replace('_', ' ')} at {n:,}" for s, n in missing) + ".\n"
+    return "\n**Missing:** " + ", ".join(str(m).replace("_", " ") for m in missing) + ".\n"
 
 
 def headline_parts(headlines):
@@ -70,7 +76,7 @@ def headline_parts(headlines):
     return parts + [
         markdown_table(LAG_NAMES, [h.lag_row() for h in headlines]),
         f"Lag: frames after a switch until the error is within 1 % or 0.1 %, at {TIGHTEST_BUDGET} µs a frame, inverse / "
-        "Gauss-Seidel. Equally compressed: both matrices to 0.1 %, both to be within 0.2 % of the exact solution.",
+        "Gauss-Seidel. Never: after no switch before the next one; >: after some of them not. Equally compressed: both matrices to 0.1 %, both to be within 0.2 % of the exact solution.",
         aims(headlines),
     ]
 
@@ -87,7 +93,6 @@ def accuracy_parts(headlines):
 def markdown(headlines, missing, date, pictures):
     """The whole file; `pictures` maps "accuracy", "winners", "frames" and scenes to paths."""
     all_results = [h.result for h in headlines]
-    largest = max(all_results, key=lambda r: r.patches)
     followed = rows.shown_on_paths(all_results)
     parts = [
         "# The stored inverse against Gauss-Seidel",
@@ -96,7 +101,7 @@ def markdown(headlines, missing, date, pictures):
         *headline_parts(headlines),
         "## How it was measured",
         METHOD.format(
-            lamps=largest["settings"]["lamps"],
+            lamps=setting(all_results, "lamps"),
             dense=max(r["dense_error"] for r in all_results),
         ),
         "## Accuracy and time",
@@ -124,12 +129,14 @@ def markdown(headlines, missing, date, pictures):
     return "\n\n".join(parts) + "\n"
 
 
-def some(rows):
-    return rows[:SHOWN_LOSSES]
+def first_rows(names, rows):
+    """A table, and where it is cut a line before it that says so."""
+    line = f"The first {SHOWN_LOSSES}:\n\n" if len(rows) > SHOWN_LOSSES else ""
+    return line + markdown_table(names, rows[:SHOWN_LOSSES])
 
 
 def where_gauss_seidel_wins(headlines):
-    slow = rows.loss_rows(rows.losses(headlines, rows.TIME_SUBJECTS))
+    slow = rows.loss_rows(rows.time_losses(headlines))
     paths = rows.losses(headlines, rows.PATH_SUBJECTS)
     path_count = sum(c.subject.startswith(rows.PATH_SUBJECTS) for h in headlines for c in h.claims)
     switch = f"{SWITCHED}, error {AIM_ERROR:g}"
@@ -137,20 +144,21 @@ def where_gauss_seidel_wins(headlines):
     repainted = [ratio_of(h.claims, "equal error", REPAINTED) for h in headlines]
     parts = [
         "The largest motion of a lamp, as a part of the scene's diagonal, at which Gauss-Seidel, warm, reaches an error in no "
-        "more time than the inverse:",
+        "more time than the inverse. None from 1 %: in no motion that was measured, of which 1 % is the smallest. –: the "
+        "two were not measured to that error.",
         markdown_table(rows.MOTION_NAMES, rows.motion_rows(headlines)),
-        f"Measured conditions in which an iteration takes no more time to an error: {len(slow)}. "
+        f"Measured conditions in which an iteration of any kind takes no more time to an error: {len(slow)}. "
         "Ratio: its time ÷ that of the inverse.",
     ]
     if slow:
-        parts.append(markdown_table(rows.LOSS_NAMES, some(slow)))
+        parts.append(first_rows(rows.LOSS_NAMES, slow))
     parts.append(
         f"Light paths on which Gauss-Seidel, warm from frame to frame, has the smaller mean error at the same budget: {len(paths)} "
         f"of {path_count}."
     )
     if paths:
         parts[-1] += " Where light changes little by little sweeps add up over the frames; a product starts anew in each."
-        parts.append(markdown_table(rows.PATH_LOSS_NAMES, some(rows.path_loss_rows(paths))))
+        parts.append(first_rows(rows.PATH_LOSS_NAMES, rows.path_loss_rows(paths)))
     parts.append(
         "\n".join(
             (

@@ -6,7 +6,6 @@ See RULES. Entries of the lab are kept as they were written, and only their link
 Usage: check_pages.py [ROOT]
 """
 
-import csv
 import pathlib
 import re
 import sys
@@ -25,10 +24,10 @@ COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 LINK = re.compile(r"\[[^\]\[]*(?:\[[^\]]*\][^\]\[]*)*\]\(([^()\s]+(?:\([^()]*\))?)\)")
 HEADING = re.compile(r"^#+ +(.*)$", re.MULTILINE)
 
-# Numbers of README, and what has one in its name.
+# Numbers of README: those of the report stand between markers, and some names have one.
+FIGURES = re.compile(r"<!-- figures -->.*?<!-- /figures -->", re.DOTALL)
 NUMBER = re.compile(r"(?<![\w.])\d[\d,]*(?:\.\d+)?")
 NAMES_WITH_NUMBERS = re.compile(r"Debian 12|x86-64|OpenGL \d\.\d|glTF 2\.0|Embree \d")
-RESULTS = "bench/results/*/report.csv"
 
 # Where sources name pages, and the tensors that pages explain.
 CITED = re.compile(r"notes/[\w/-]+\.(?:md|csv)")
@@ -78,28 +77,12 @@ def readme_is_short(pages):
 
 
 def figures_are_measured(pages):
-    """Every number of README is in the results of the report, rounded; milliseconds for microseconds."""
-    prose = CODE_SPAN.sub("", COMMENT.sub("", without_code(pages.text["README.md"])))
-    prose = NAMES_WITH_NUMBERS.sub("", re.sub(r"\]\([^)]*\)", "]", prose))
-    measured = measured_numbers(pages.root)
-    for text in NUMBER.findall(prose):
-        digits = text.rstrip(",").replace(",", "")
-        precision = len(digits.replace(".", "").lstrip("0")) or 1
-        if not any(float(f"{value:.{precision}g}") == float(digits) for value in measured):
-            yield f"README.md: {text} is not in {RESULTS}"
-
-
-def measured_numbers(root):
-    """The values of all rows, the errors of their conditions in per cent, and the number of scenes."""
-    found, scenes = set(), set()
-    for path in root.glob(RESULTS):
-        lines = [line for line in path.read_text(encoding="utf-8").splitlines() if line[:1] != "#"]
-        for row in csv.DictReader(lines):
-            scenes.add(row["scene"])
-            values = [float(row[name]) for name in ("inverse_value", "rival_value", "ratio") if row[name]]
-            found.update(values, (value / 1000 for value in values), [float(row["patches"])])
-            found.update(100 * float(error) for error in re.findall(r"error ([\d.]+)", row["condition"]))
-    return found | {float(len(scenes))}
+    """README has numbers between its markers alone, where bench/report/performance.py writes and
+    checks them, and in names."""
+    prose = FIGURES.sub("", without_code(pages.text["README.md"]))
+    prose = re.sub(r"\]\([^)]*\)", "]", CODE_SPAN.sub("", COMMENT.sub("", prose)))
+    for text in NUMBER.findall(NAMES_WITH_NUMBERS.sub("", prose)):
+        yield f"README.md: {text} is not among the figures that performance.py writes"
 
 
 def pages_are_short(pages):
