@@ -105,7 +105,11 @@ ViewerSetup make_setup(const ViewOptions& chosen, const std::shared_ptr<const Tr
 void report(const StageTimes& times, int frames, const ChosenCamera& camera,
             const CommonOptions& options) {
   nlohmann::json card = nlohmann::json::object();
-  for (const GpuStageTime& stage : times.card) card[stage.name] = stage.microseconds;
+  double on_card = 0;
+  for (const GpuStageTime& stage : times.card) {
+    card[stage.name] = stage.microseconds;
+    on_card += stage.microseconds;
+  }
   const nlohmann::json summary = {{"frames", frames},
                                   {"camera", as_json(camera)},
                                   {"microseconds",
@@ -121,9 +125,9 @@ void report(const StageTimes& times, int frames, const ChosenCamera& camera,
   } else if (!options.quiet) {
     fmt::print(
         "{} frames; median milliseconds: direct {:.2f}, solve {:.2f}, upload {:.2f}, "
-        "shadows {:.2f}, draw {:.2f}\n{}\n",
+        "shadows {:.2f}, graphics card {:.2f}, draw {:.2f}\n{}\n",
         frames, times.direct / 1e3, (times.solve[0] + times.solve[1]) / 1e3, times.upload / 1e3,
-        times.shadows / 1e3, times.draw / 1e3, described(camera));
+        times.shadows / 1e3, on_card / 1e3, times.draw / 1e3, described(camera));
   }
 }
 

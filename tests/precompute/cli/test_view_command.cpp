@@ -127,6 +127,13 @@ TEST_F(ViewCommand, DrawsALitScene) {
     EXPECT_GT(image.mean(c), 25);
     EXPECT_LT(image.mean(c), 200);
   }
+  // More than 16-bit floats hold is white.
+  const Image white = screenshot({"--lights", kLights, "--exposure", "30"});
+  ASSERT_EQ(white.rgb.size(), image.rgb.size());
+  for (std::size_t k = 0; k < white.rgb.size(); ++k) {
+    if (image.rgb[k] <= 20) continue;
+    ASSERT_GT(white.rgb[k], 250) << "value " << k;
+  }
 }
 
 TEST_F(ViewCommand, SharesItsFileWithEngines) {
@@ -214,6 +221,8 @@ TEST_F(ViewCommand, TheGraphicsCardShowsThePictureOfTheProcessor) {
                              "--screenshot", path("try.png")});
   // The software renderer that ./dev test installs has it; drivers of other machines may not.
   if (tried.err.find("OpenGL 4.3 is needed") != std::string::npos) GTEST_SKIP() << tried.err;
+  EXPECT_NE(tried.out.find("graphics card "), std::string::npos) << tried.out;
+  EXPECT_EQ(tried.out.find("graphics card 0.00"), std::string::npos) << tried.out;
   // A point, which the card lights itself; a sphere and a sky, which the processor gives it.
   const std::string mixed = write("mixed.lights.json", R"({"lights": [
       {"type": "point", "position": [0.2, 0.4, 0.1], "intensity": 20, "color": [1, 0.6, 0.3]},
@@ -230,6 +239,17 @@ TEST_F(ViewCommand, TheGraphicsCardShowsThePictureOfTheProcessor) {
     EXPECT_LT(apart.mean, 1.0) << lights;
     EXPECT_LT(apart.largest, 12) << lights;
   }
+}
+
+TEST_F(ViewCommand, SaysWhyTheGraphicsCardRefusesAScene) {
+  const std::string dense = path("dense.safetensors");
+  ASSERT_EQ(run(test::quick({"precompute", kScene, "--patches", "120", "--operator", "dense",
+                             "--quiet", "-o", dense}))
+                .exit_code,
+            kDone);
+  expect_refused({"view", dense, "--method", "graphics-card", "--size", "16x16", "--screenshot",
+                  path("no.png")},
+                 "hierarchical operators alone");
 }
 
 TEST_F(ViewCommand, ASkyByCellsLooksAsRenderDrawsIt) {

@@ -30,7 +30,6 @@ class CardLight {
 
   /// Microseconds of the last frame by stage.
   std::vector<GpuStageTime> stage_times() const { return engine_.stage_times(); }
-  std::size_t bytes() const { return engine_.bytes(); }
 
  private:
   GpuEngine engine_;

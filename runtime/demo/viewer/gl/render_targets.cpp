@@ -1,5 +1,6 @@
 #include "runtime/demo/viewer/gl/render_targets.h"
 
+#include <string>
 #include <vector>
 
 #include "rebounce/error.h"
@@ -9,11 +10,11 @@ namespace {
 
 constexpr int kSamples = 4;  // per pixel
 
-void check_complete() {
+// `pictures`: what the bound framebuffer is to hold, in words.
+void check_complete(const std::string& pictures) {
   if (glCheckFramebufferStatus(GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
-    throw Error(
-        "viewer: this OpenGL has no 16-bit float pictures of four samples a pixel; try "
-        "another driver");
+    throw Error("viewer: this OpenGL has no " + pictures +
+                " or none of this size; ask for a smaller one, or try another driver");
   }
 }
 
@@ -32,7 +33,7 @@ void MultisampledTarget::resize(int width, int height) {
                             multisampled_color_.name());
   glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_DEPTH_ATTACHMENT, GL_RENDERBUFFER,
                             multisampled_depth_.name());
-  check_complete();
+  check_complete("16-bit float pictures of four samples a pixel");
   glBindTexture(GL_TEXTURE_2D, resolved_color_.name());
   glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA16F, width, height, 0, GL_RGBA, GL_FLOAT, nullptr);
   glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_NEAREST);
@@ -40,7 +41,7 @@ void MultisampledTarget::resize(int width, int height) {
   glBindFramebuffer(GL_FRAMEBUFFER, resolved_.name());
   glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D,
                          resolved_color_.name(), 0);
-  check_complete();
+  check_complete("16-bit float pictures");
 }
 
 GLuint MultisampledTarget::resolve() const {
@@ -55,7 +56,7 @@ OffscreenTarget::OffscreenTarget(int width, int height) : width_(width), height_
   glRenderbufferStorage(GL_RENDERBUFFER, GL_RGBA8, width, height);
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_.name());
   glFramebufferRenderbuffer(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_RENDERBUFFER, color_.name());
-  check_complete();
+  check_complete("pictures of 8 bits a channel");
 }
 
 ScreenImage OffscreenTarget::read() const {

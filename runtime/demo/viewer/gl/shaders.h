@@ -126,7 +126,8 @@ vec3 tone_curve(vec3 color) {
 }
 
 void main() {
-  vec3 color = texelFetch(light, ivec2(gl_FragCoord.xy), 0).rgb;
+  // Sums past the largest 16-bit float are infinite.
+  vec3 color = min(texelFetch(light, ivec2(gl_FragCoord.xy), 0).rgb, vec3(65504));
   if (display_referred == 0) color = tone_curve(color);
   color = clamp(color, 0, 1);
   vec3 encoded = mix(12.92 * color, 1.055 * pow(max(color, 1e-6), vec3(1 / 2.4)) - 0.055,

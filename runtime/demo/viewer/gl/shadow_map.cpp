@@ -103,6 +103,8 @@ ShadowMap::ShadowMap() {
 
 void ShadowMap::update(const Light& light, const ShadowCasters& casters, const GlProgram& program,
                        int cube_side) {
+  // The memory of another kind of map is given back.
+  if (drawn_ && kind_of(light) != kind_of(drawn_for_)) *this = ShadowMap();
   const bool has_side = kind_of(light) != MapKind::kCube || cube_side == cube_side_;
   if (drawn_ && has_side && casters.version == drawn_version_ && casts_alike(light, drawn_for_))
     return;
@@ -174,9 +176,7 @@ void ShadowMap::draw_places(const Light& light, const ShadowCasters& casters,
                             const GlProgram& program) {
   constexpr int kFaceCount = static_cast<int>(kFaces.size());
   glBindTexture(GL_TEXTURE_2D_ARRAY, places_.name());
-  if (!drawn_ || kind_of(drawn_for_) != MapKind::kPlaces) {
-    allocate_layers(kPlaceSide, kFaceCount * static_cast<int>(kLampPlaceCount));
-  }
+  if (!drawn_) allocate_layers(kPlaceSide, kFaceCount * static_cast<int>(kLampPlaceCount));
   set_reach(to_glm(light.position), casters.bounds);
   int layer = 0;
   const PreparedLight lamp(light);
@@ -192,7 +192,7 @@ void ShadowMap::draw_plane(const Light& light, const ShadowCasters& casters,
                            const GlProgram& program) {
   const SceneBounds& bounds = casters.bounds;
   glBindTexture(GL_TEXTURE_2D, plane_.name());
-  if (!drawn_ || kind_of(drawn_for_) != MapKind::kPlane) allocate(GL_TEXTURE_2D, kPlaneSide);
+  if (!drawn_) allocate(GL_TEXTURE_2D, kPlaneSide);
   const glm::mat3 frame(frame_around(-to_dvec3(light.direction)));
   const glm::mat3 plane_axes = glm::transpose(frame);
   glm::vec3 low(std::numeric_limits<float>::max()), high(-low);

@@ -153,6 +153,7 @@ void Controls::fly(ViewerState& state) const {
 }
 
 std::optional<std::size_t> Controls::lamp_under_mouse(const ViewerState& state) const {
+  if (!state.shows_panels) return std::nullopt;  // discs are hidden
   const ImVec2 mouse = ImGui::GetIO().MousePos;
   std::optional<std::size_t> nearest;
   float least = 2 * kHandleRadius;

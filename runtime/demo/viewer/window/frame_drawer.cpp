@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "rebounce/error.h"
 #include "runtime/demo/bake/punctual_light.h"
 #include "runtime/demo/image/color_map.h"
 
@@ -27,9 +28,13 @@ std::vector<Light> without_profiles(std::vector<Light> lights) {
   return lights;
 }
 
-// How many sides of the screen are shown.
-std::size_t side_count(const ViewerState& state) {
-  return state.is_split ? kSideCount : 1;
+// Adds times of the same stages to `sums`, which begins empty.
+void add_by_stage(const std::vector<GpuStageTime>& times, std::vector<GpuStageTime>& sums) {
+  if (sums.empty()) {
+    sums = times;
+    return;
+  }
+  for (std::size_t k = 0; k < sums.size(); ++k) sums[k].microseconds += times[k].microseconds;
 }
 
 // Those that the card does not light; the others are dark.
@@ -56,9 +61,9 @@ FrameDrawer::FrameDrawer(const std::shared_ptr<const TransferData>& data, const 
 void FrameDrawer::draw(ViewerState& state, int width, int height, GLuint framebuffer) {
   const std::vector<Light> lights = state.lights_now();
   times_.direct = 0;
-  const std::span<const IndirectMethod> methods = std::span(state.methods).first(side_count(state));
-  const auto is_on_card = [](const IndirectMethod& method) { return method.on_card; };
-  const bool any_on_card = std::ranges::any_of(methods, is_on_card);
+  make_card(state);
+  const std::span<const IndirectMethod> methods = state.shown_methods();
+  const bool any_on_card = std::ranges::any_of(methods, &IndirectMethod::on_card);
   if (any_on_card) {
     const auto direct = lit_.direct_light(dark_where_on_card(lights), state.sky, times_);
     others_.assign(direct.begin(), direct.end());
@@ -72,7 +77,7 @@ void FrameDrawer::draw(ViewerState& state, int width, int height, GLuint framebu
   const bool patches_of_card =
       state.wants_exposure || state.show == Show::kError || !state.spheres_now().empty();
   times_.solve = {};
-  if (patches_of_card || !std::ranges::all_of(methods, is_on_card)) {
+  if (patches_of_card || !std::ranges::all_of(methods, &IndirectMethod::on_card)) {
     lit_.relight(lights, state.sky, state.methods, state.is_split, patches_of_card, times_);
   }
   if (state.wants_exposure) {
@@ -102,6 +107,17 @@ void FrameDrawer::draw(ViewerState& state, int width, int height, GLuint framebu
   times_.draw = microseconds_of([&] { renderer_.draw(frame, framebuffer); });
 }
 
+void FrameDrawer::make_card(ViewerState& state) {
+  if (card_ || std::ranges::none_of(state.shown_methods(), &IndirectMethod::on_card)) return;
+  try {
+    card_ = std::make_unique<CardLight>(data_);
+  } catch (const Error& error) {
+    card_refusal_ = error.what();
+    has_card_ = false;
+    for (IndirectMethod& method : state.methods) method.on_card = false;
+  }
+}
+
 void FrameDrawer::upload(const ViewerState& state) {
   if (state.show == Show::kError) {
     upload_errors();
@@ -115,25 +131,24 @@ void FrameDrawer::upload(const ViewerState& state) {
     return;
   }
   gpu_.upload_first_flight(lit_.first_flight_at_vertices(state.sky));
-  for (std::size_t k = 0; k < side_count(state); ++k) {
+  for (std::size_t k = 0; k < state.shown_methods().size(); ++k) {
     const auto side = static_cast<Side>(k);
     if (!state.methods[k].on_card) gpu_.upload_bounced(side, lit_.bounced_at_vertices(side));
   }
 }
 
 void FrameDrawer::relight_on_card(const ViewerState& state, std::span<const Light> lights) {
-  if (!card_) card_ = std::make_unique<CardLight>(data_);
   std::vector<GpuLamp> lamps;
   for (std::size_t k = 0; k < lights.size(); ++k) {
     if (CardLight::can_light(lights[k])) {
       lamps.push_back(renderer_.shadow_map(k).for_card(lights[k]));
     }
   }
-  for (std::size_t k = 0; k < side_count(state); ++k) {
+  for (std::size_t k = 0; k < state.shown_methods().size(); ++k) {
     if (!state.methods[k].on_card) continue;
     card_->relight(lamps, others_, gpu_.bounced_buffer(static_cast<Side>(k)));
+    add_by_stage(card_->stage_times(), times_.card);
   }
-  times_.card = card_->stage_times();
 }
 
 BodyMesh FrameDrawer::make_spheres(std::span<const ViewerSphere> spheres,

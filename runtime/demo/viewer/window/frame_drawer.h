@@ -3,6 +3,7 @@
 #include <array>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "runtime/demo/viewer/gl/card_light.h"
@@ -18,19 +19,24 @@ class FrameDrawer {
  public:
   FrameDrawer(const std::shared_ptr<const TransferData>& data, const ViewerSetup& setup);
 
-  /// Relights and draws `state` into `framebuffer`.
+  /// Relights and draws `state` into `framebuffer`. Where the graphics card refuses the scene, its
+  /// sides become those of the processor, and card_refusal() tells why.
   void draw(ViewerState& state, int width, int height, GLuint framebuffer);
 
   const StageTimes& times() const { return times_; }
   const LitScene& scene() const { return lit_; }
   /// Whether frames may be on the graphics card.
   bool has_card() const { return has_card_; }
+  /// Why the graphics card refuses, in one line; empty: it does not, or was not asked.
+  const std::string& card_refusal() const { return card_refusal_; }
   const SceneBounds& bounds() const { return renderer_.bounds(); }
 
   /// The largest shown error of a patch (LitScene::patch_errors); 0 without errors.
   float error_top() const { return error_top_; }
 
  private:
+  /// Makes card_ if a side is on the card and there is none yet.
+  void make_card(ViewerState& state);
   void upload(const ViewerState& state);
   /// Lights the sides that are on the card.
   void relight_on_card(const ViewerState& state, std::span<const Light> lights);
@@ -44,6 +50,7 @@ class FrameDrawer {
   SceneRenderer renderer_;
   std::unique_ptr<CardLight> card_;  // made when it is first asked for
   bool has_card_;
+  std::string card_refusal_;
   std::vector<Float3> others_;  // direct light of the processor for the card
   StageTimes times_;
   std::vector<ViewerSphere> spheres_;                       // of the last frame

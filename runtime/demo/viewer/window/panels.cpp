@@ -9,6 +9,7 @@
 #include <numbers>
 #include <string>
 
+#include "runtime/demo/bake/punctual_light.h"
 #include "runtime/demo/viewer/window/controls.h"
 #include "runtime/lights/lamp_kind.h"
 #include "runtime/rays/float3_glm.h"
@@ -111,20 +112,30 @@ void edit_type(Light& light, float size) {
     if (ImGui::Selectable(std::string(kind->name).c_str(), kind->type == type)) type = kind->type;
   }
   ImGui::EndCombo();
-  if (type == light.type) return;
-  const bool was_far = !lamp_kind(light.type).has_place();
-  const float candela = light.intensity * candela_of_unit(light);
-  light.type = type;
-  complete_lengths(light, size);
-  light.intensity = candela / candela_of_unit(light);
-  const bool is_far = !lamp_kind(light.type).has_place();
-  // Candela are not lux: start with a typical indoor value.
-  if (was_far != is_far) light.intensity = is_far ? 1000 : 100 / candela_of_unit(light);
+  if (type != light.type) change_type(light, type, size);
+}
+
+// Edits keep values within what a frame takes.
+void edit_color(const char* label, Float3& color) {
+  constexpr float kBrightest = 1e6F;
+  if (!ImGui::ColorEdit3(label, color.data(), ImGuiColorEditFlags_Float)) return;
+  for (float& part : color) part = std::clamp(part, 0.0F, kBrightest);
+}
+
+void edit_place(const char* label, Float3& place, float step) {
+  constexpr float kFarthest = 1e9F;  // metres; its square is finite
+  ImGui::DragFloat3(label, place.data(), step, -kFarthest, kFarthest, "%.2f",
+                    ImGuiSliderFlags_AlwaysClamp);
+}
+
+bool edit_vector(const LampField& field, Light& light) {
+  return ImGui::DragFloat3(field.label, field.values(light).data(), 0.01F, -1, 1, "%.2f",
+                           ImGuiSliderFlags_AlwaysClamp);
 }
 
 void edit_unit_vector(const LampField& field, Light& light) {
+  if (!edit_vector(field, light)) return;
   const std::span<float> v = field.values(light);
-  if (!ImGui::DragFloat3(field.label, v.data(), 0.01F, -1, 1, "%.2f")) return;
   const glm::vec3 given(v[0], v[1], v[2]);
   const float length = glm::length(given);
   std::ranges::copy(length > 1e-3F ? to_float3(given / length) : Float3{0, -1, 0}, v.begin());
@@ -139,7 +150,7 @@ void edit_shape(Light& light, float step) {
                          static_cast<int>(values.size()), step, &kSmallest, &kLargest, "%.2f m",
                          ImGuiSliderFlags_AlwaysClamp);
     } else if (field->rule == FieldRule::kAcross) {
-      ImGui::DragFloat3(field->label, values.data(), 0.01F, -1, 1, "%.2f");
+      edit_vector(*field, light);
     } else if (field->rule == FieldRule::kUnitVector && field != &kDirection) {
       edit_unit_vector(*field, light);
     }
@@ -155,11 +166,14 @@ void keep_first_side_across(Light& light) {
 
 void edit_cone(Light& light) {
   float inner = light.inner_cone_angle / kDegree, outer = light.outer_cone_angle / kDegree;
-  ImGui::SliderFloat("outer cone", &outer, 1, 90, "%.0f deg", ImGuiSliderFlags_AlwaysClamp);
-  ImGui::SliderFloat("inner cone", &inner, 0, outer - 0.5F, "%.0f deg",
-                     ImGuiSliderFlags_AlwaysClamp);
+  bool changed =
+      ImGui::SliderFloat("outer cone", &outer, 1, 90, "%.0f deg", ImGuiSliderFlags_AlwaysClamp);
+  const float most = std::max(outer - 0.5F, 0.0F);
+  changed |=
+      ImGui::SliderFloat("inner cone", &inner, 0, most, "%.0f deg", ImGuiSliderFlags_AlwaysClamp);
+  if (!changed) return;
   light.outer_cone_angle = outer * kDegree;
-  light.inner_cone_angle = std::min(inner, outer - 0.5F) * kDegree;
+  light.inner_cone_angle = std::min(inner, most) * kDegree;
 }
 
 // Starts a motion around a position.
@@ -184,47 +198,23 @@ void edit_motion(const Float3& position, LightMotion& motion, float step) {
   ImGui::DragFloat("period", &motion.period, 0.05F, 0.1F, 600, "%.1f s",
                    ImGuiSliderFlags_AlwaysClamp);
   if (motion.kind == LightMotion::Kind::kCircle) {
-    ImGui::DragFloat3("centre", motion.center.data(), step, 0, 0, "%.2f");
+    edit_place("centre", motion.center, step);
     ImGui::DragFloat("circle", &motion.radius, step, 0, 1e6F, "%.2f m",
                      ImGuiSliderFlags_AlwaysClamp);
   } else {
-    ImGui::DragFloat3("from", motion.from.data(), step, 0, 0, "%.2f");
-    ImGui::DragFloat3("to", motion.to.data(), step, 0, 0, "%.2f");
+    edit_place("from", motion.from, step);
+    edit_place("to", motion.to, step);
   }
-}
-
-// `size`: that of the scene, metres.
-void edit_lamp(ViewerLight& lamp, const FlyCamera& camera, float size) {
-  Light& light = lamp.light;
-  const float step = kStepPart * size;
-  ImGui::Checkbox("on", &lamp.on);
-  edit_type(light, size);
-  const LampKind& kind = lamp_kind(light.type);
-  ImGui::ColorEdit3("colour", light.color.data(), ImGuiColorEditFlags_Float);
-  ImGui::DragFloat("intensity", &light.intensity, 0.01F * std::max(light.intensity, 0.1F), 0, 1e9F,
-                   ("%.1f " + std::string(kind.unit)).c_str(),
-                   ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_NoRoundToFormat);
-  edit_shape(light, 0.2F * step);
-  if (kind.has_place() && lamp.motion.kind == LightMotion::Kind::kStill) {
-    ImGui::DragFloat3("position", light.position.data(), step, 0, 0, "%.2f");
-  }
-  if (kind.uses(kDirection)) {
-    edit_unit_vector(kDirection, light);
-    if (ImGui::Button("Shine where I look")) light.direction = to_float3(camera.forward());
-  }
-  if (kind.uses(kTangent) || light.profile) keep_first_side_across(light);
-  if (kind.uses(kCone)) edit_cone(light);
-  if (kind.has_place()) edit_motion(light.position, lamp.motion, step);
 }
 
 void edit_sphere(ViewerSphere& sphere, float size) {
   const float step = kStepPart * size;
   ImGui::Checkbox("there", &sphere.on);
-  ImGui::ColorEdit3("reflects", sphere.reflectance.data(), ImGuiColorEditFlags_Float);
+  edit_color("reflects", sphere.reflectance);
   ImGui::DragFloat("radius", &sphere.radius, 0.2F * step, 1e-3F, 1e4F, "%.2f m",
                    ImGuiSliderFlags_AlwaysClamp);
   if (sphere.motion.kind == LightMotion::Kind::kStill) {
-    ImGui::DragFloat3("position", sphere.position.data(), step, 0, 0, "%.2f");
+    edit_place("position", sphere.position, step);
   }
   edit_motion(sphere.position, sphere.motion, step);
 }
@@ -238,6 +228,45 @@ void list_line(std::size_t k, const std::string& name, std::size_t& selected) {
 }
 
 }  // namespace
+
+void change_type(Light& light, LightType type, float size) {
+  if (light.profile && !lamp_kind(type).uses(kProfile)) light = punctual_equivalent(light);
+  const bool was_far = !lamp_kind(light.type).has_place();
+  const float candela = light.intensity * candela_of_unit(light);
+  light.type = type;
+  complete_lengths(light, size);
+  light.intensity = candela / candela_of_unit(light);
+  const bool is_far = !lamp_kind(light.type).has_place();
+  // Candela are not lux: start with a typical indoor value.
+  if (was_far != is_far) light.intensity = is_far ? 1000 : 100 / candela_of_unit(light);
+}
+
+void edit_lamp(ViewerLight& lamp, const FlyCamera& camera, float size) {
+  Light& light = lamp.light;
+  const float step = kStepPart * size;
+  ImGui::Checkbox("on", &lamp.on);
+  edit_type(light, size);
+  const LampKind& kind = lamp_kind(light.type);
+  ImGui::BeginDisabled(lamp.motion.kind == LightMotion::Kind::kKeys);  // keys have their own
+  edit_color("colour", light.color);
+  // A profile has the candela, and the intensity is their factor.
+  const std::string unit = light.profile ? "x profile" : std::string(kind.unit);
+  ImGui::DragFloat("intensity", &light.intensity, 0.01F * std::max(light.intensity, 0.1F), 0, 1e9F,
+                   ("%.1f " + unit).c_str(),
+                   ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_NoRoundToFormat);
+  if (kind.uses(kDirection)) {
+    edit_unit_vector(kDirection, light);
+    if (ImGui::Button("Shine where I look")) light.direction = to_float3(camera.forward());
+  }
+  ImGui::EndDisabled();
+  if (kind.has_place() && lamp.motion.kind == LightMotion::Kind::kStill) {
+    edit_place("position", light.position, step);
+  }
+  edit_shape(light, 0.2F * step);
+  if (kind.uses(kTangent) || light.profile) keep_first_side_across(light);
+  if (kind.uses(kCone)) edit_cone(light);
+  if (kind.has_place()) edit_motion(light.position, lamp.motion, step);
+}
 
 void Panels::smooth(const StageTimes& times) {
   // The first frames fill caches and create solvers; they are not counted.
@@ -284,7 +313,8 @@ void Panels::draw_view(ViewerState& state, const FrameDrawer& frame) const {
       state.show = kShows[k].show;
     }
   }
-  ImGui::SliderFloat("exposure", &state.exposure, -16, 16, "%+.1f EV");
+  ImGui::SliderFloat("exposure", &state.exposure, -16, 16, "%+.1f EV",
+                     ImGuiSliderFlags_AlwaysClamp);
   if (ImGui::Button("Find exposure")) state.wants_exposure = true;
   if (state.show != Show::kError) return;
   if (!frame.scene().has_reference()) {
@@ -295,15 +325,21 @@ void Panels::draw_view(ViewerState& state, const FrameDrawer& frame) const {
   ImGui::Text("error, area-weighted  %.2e", frame.scene().error(Side::kFirst));
   if (state.is_split) ImGui::Text("right                 %.2e", frame.scene().error(Side::kSecond));
   ImGui::Text("yellow is             %.2e", static_cast<double>(frame.error_top()));
+  if (std::ranges::any_of(state.shown_methods(), &IndirectMethod::on_card)) {
+    ImGui::TextWrapped("For the graphics card: the error of the product on the processor.");
+  }
 }
 
 void Panels::draw_methods(ViewerState& state, const FrameDrawer& frame) const {
   if (!ImGui::CollapsingHeader("Indirect light", ImGuiTreeNodeFlags_DefaultOpen)) return;
   const TransferData& data = frame.scene().data();
   choose_method(state.is_split ? "left" : "method", data, frame.has_card(), state.methods[0]);
+  if (!frame.card_refusal().empty()) {
+    ImGui::TextWrapped("%s: %s", kCardName, frame.card_refusal().c_str());
+  }
   ImGui::Checkbox("split the screen", &state.is_split);
   if (!state.is_split) return;
-  ImGui::SliderFloat("at", &state.split, 0, 1, "%.2f");
+  ImGui::SliderFloat("at", &state.split, 0, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp);
   choose_method("right", data, frame.has_card(), state.methods[1]);
 }
 
@@ -351,7 +387,7 @@ void Panels::draw_lights(ViewerState& state, const FrameDrawer& frame) const {
     if (remove) state.remove_lamp(state.selected);
   }
   ImGui::Separator();
-  ImGui::ColorEdit3("sky", state.sky.color.data(), ImGuiColorEditFlags_Float);
+  edit_color("sky", state.sky.color);
   ImGui::DragFloat("luminance", &state.sky.luminance, 0.01F * std::max(state.sky.luminance, 1.0F),
                    0, 1e6F, "%.1f cd/m2", ImGuiSliderFlags_AlwaysClamp);
 }

@@ -22,4 +22,12 @@ class Panels {
   int frame_ = 0;
 };
 
+/// Draws the controls of a lamp in a scene of `size` metres and applies the user's changes, within
+/// what a frame takes.
+void edit_lamp(ViewerLight& lamp, const FlyCamera& camera, float size);
+
+/// Makes a lamp of another type of `light`, as bright where both have a place. Lengths that it
+/// lacks suit a scene of `size` metres; a profile goes where the type has none.
+void change_type(Light& light, LightType type, float size);
+
 }  // namespace rebounce

@@ -121,6 +121,7 @@ StageTimes draw_viewer_frames(const std::shared_ptr<const TransferData>& data,
   for (int frame = 0; frame < frame_count; ++frame) {
     state.time = static_cast<float>(frame) / frames_per_second;
     drawer.draw(state, setup.width, setup.height, target.framebuffer());
+    if (!drawer.card_refusal().empty()) throw Error(drawer.card_refusal());
     times.push_back(drawer.times());
     if (overlay) overlay->draw(panels, controls, state, drawer);
     take(frame, target.read());

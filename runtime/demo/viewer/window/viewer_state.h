@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "rebounce/sky.h"
 #include "runtime/demo/motion/fly_camera.h"
@@ -29,6 +30,11 @@ struct ViewerState {
       if (light.on) now.push_back(moved(light.light, light.motion, time));
     }
     return now;
+  }
+
+  /// Those of the sides of the screen that are shown.
+  std::span<const IndirectMethod> shown_methods() const {
+    return std::span(methods).first(is_split ? methods.size() : 1);
   }
 
   /// The shown spheres, at the current time.
