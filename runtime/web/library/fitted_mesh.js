@@ -47,7 +47,8 @@ class SurfaceGrid {
     const off = slack * this.size;
     const normal = whole.getNormal(new THREE.Vector3());
     const area = whole.getArea();
-    const box = new THREE.Box3().setFromPoints([whole.a, whole.b, whole.c]).expandByScalar(off);
+    const box = new THREE.Box3().setFromPoints([whole.a, whole.b, whole.c]).expandByScalar(off)
+                    .intersect(this.box);
     const low = this.#cellOf(box.min), high = this.#cellOf(box.max);
     const at = new THREE.Vector3(), found = [];
     let facing = 0;

@@ -74,11 +74,11 @@ export class Instance {
     exports._initialize();
   }
 
-  /** Calls a function; a trap makes the instance useless, and says so. */
+  /** Calls a function, for a status or an address; a trap makes the instance useless, and says so. */
   call(name, ...args) {
     if (this.broken) throw new RebounceError('the module has stopped; load the file again');
     try {
-      return this.#exports[name](...args);
+      return this.#exports[name](...args) >>> 0;  // addresses reach beyond 2 GiB
     } catch (error) {
       this.broken = true;
       shared = null;

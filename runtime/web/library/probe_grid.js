@@ -2,8 +2,8 @@
 
 import * as THREE from 'three';
 
-const floats = 27;      // of a probe: harmonics of degree 0 to 2, three channels
-const subVolumes = 7;   // of four floats each, one above the other in the texture
+const floats = 27;  // of a probe: harmonics of degree 0 to 2, three channels
+export const subVolumes = 7;  // of four floats each, one above the other in the texture
 
 /** For each probe that is inside of something, others whose mean stands for it, nearest first. */
 function findStandIns([nx, ny, nz], valid) {

@@ -42,6 +42,7 @@ export interface Mesh {
   readonly position: Float32Array;
   readonly normal: Float32Array;
   readonly texcoord: Float32Array;
+  readonly emissiveTexcoord: Float32Array;
   readonly color: Float32Array;
   readonly triangle: Uint32Array;
   readonly triangleMaterial: Uint32Array;
@@ -59,6 +60,12 @@ export interface Patches {
   readonly normal: Float32Array;
 }
 
+/** An image in its file format. */
+export interface Texture {
+  readonly image: Uint8Array;
+  readonly wrap: ('repeat' | 'clamp' | 'mirror')[];
+}
+
 export interface Material {
   readonly name: string;
   readonly baseColor: number[];
@@ -67,7 +74,10 @@ export interface Material {
   readonly alphaMode: 'opaque' | 'mask' | 'blend';
   readonly alphaCutoff: number;
   readonly alpha: number;
-  readonly texture: { image: Uint8Array; wrap: ('repeat' | 'clamp' | 'mirror')[] } | null;
+  /** The part of light that passes through, unless it emits. */
+  readonly transmission: number;
+  readonly texture: Texture | null;
+  readonly emissiveTexture: Texture | null;
 }
 
 export interface Camera {

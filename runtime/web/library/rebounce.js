@@ -429,6 +429,7 @@ function readMesh(file) {
     position: file.tensor('mesh.position'),
     normal: file.tensor('mesh.normal'),
     texcoord: file.tensor('mesh.base_color_texcoord'),
+    emissiveTexcoord: file.tensor('mesh.emissive_texcoord'),
     color: file.tensor('mesh.vertex_color'),
     triangle: file.tensor('mesh.triangle'),
     triangleMaterial: file.tensor('mesh.triangle_material'),
@@ -449,17 +450,21 @@ function readProbes(file) {
   };
 }
 
-const none = 0xFFFFFFFF;
-
 function readMaterials(file) {
   const color = file.tensor('material.base_color');
   const luminance = file.tensor('material.emitted_luminance');
-  const texture = file.tensor('material.base_color_texture');
+  const [texture, emissiveTexture] =
+      ['base_color', 'emissive'].map((name) => file.tensor(`material.${name}_texture`));
   const alphaMode = file.tensor('material.alpha_mode');
   const cutoff = file.tensor('material.alpha_cutoff');
   const alpha = file.tensor('material.base_alpha');
+  const transmission = file.tensor('material.transmission');
   const wraps = [file.tensor('texture.wrap_s'), file.tensor('texture.wrap_t')];
   const names = JSON.parse(file.metadata.names ?? '{}').materials ?? [];
+  const textureOf = (number) => {
+    const image = file.tensor(`texture.${number}`);
+    return image && { image, wrap: wraps.map((wrap) => ['repeat', 'clamp', 'mirror'][wrap[number]]) };
+  };
   return Array.from(texture, (number, k) => ({
     name: names[k] ?? '',
     baseColor: [...color.subarray(3 * k, 3 * k + 3)],
@@ -467,10 +472,9 @@ function readMaterials(file) {
     alphaMode: ['opaque', 'mask', 'blend'][alphaMode[k]],
     alphaCutoff: cutoff[k],
     alpha: alpha[k],
-    texture: number === none ? null : {
-      image: file.tensor(`texture.${number}`),
-      wrap: wraps.map((wrap) => ['repeat', 'clamp', 'mirror'][wrap[number]]),
-    },
+    transmission: transmission[k],
+    texture: textureOf(number),
+    emissiveTexture: textureOf(emissiveTexture[k]),
   }));
 }
 

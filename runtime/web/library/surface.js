@@ -49,12 +49,14 @@ export class Surface {
 
   /** What is drawn, with a group for each material. */
   makeGeometry(materialCount) {
-    const { normal, texcoord, color } = this.#mesh;
+    const { normal, texcoord, emissiveTexcoord, color } = this.#mesh;
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute('position', new THREE.BufferAttribute(this.position, 3));
-    geometry.setAttribute('normal', new THREE.BufferAttribute(this.spread(normal, 3), 3));
-    geometry.setAttribute('uv', new THREE.BufferAttribute(this.spread(texcoord, 2), 2));
-    geometry.setAttribute('color', new THREE.BufferAttribute(this.spread(color, 3), 3));
+    for (const [name, values, size] of [
+      ['normal', normal, 3], ['uv', texcoord, 2], ['uv1', emissiveTexcoord, 2], ['color', color, 3],
+    ]) {
+      geometry.setAttribute(name, new THREE.BufferAttribute(this.spread(values, size), size));
+    }
     const index = [];
     for (let material = 0; material < materialCount; ++material) {
       const start = index.length;

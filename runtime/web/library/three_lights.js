@@ -1,6 +1,26 @@
 // Lights of three.js as lights of Rebounce.
 
 import * as THREE from 'three';
+import { RebounceError } from './instance.js';
+
+// Range and cone as in KHR_lights_punctual; those of three.js differ.
+const formulas = `
+float getDistanceAttenuation(float metres, float range, float decay) {
+  float window = range > 0.0 ? saturate(1.0 - pow4(metres / range)) : 1.0;
+  return window / max(pow2(metres), 1e-12);
+}
+float getSpotAttenuation(float outer, float inner, float cosine) {
+  return pow2(saturate((cosine - outer) / max(0.001, inner - outer)));
+}
+`;
+const lightFunctions = formulas + THREE.ShaderChunk.lights_pars_begin.replace(
+    /float get(Distance|Spot)Attenuation/g, 'float unused$1Attenuation');
+
+/** Lets a shader of three.js light by the formulas of Rebounce. */
+export function replaceLightFormulas(shader) {
+  shader.fragmentShader =
+      shader.fragmentShader.replace('#include <lights_pars_begin>', lightFunctions);
+}
 
 /** Whether three.js draws it: it and all that it is in are visible. */
 function isShown(object) {
@@ -12,9 +32,13 @@ function isShown(object) {
 
 /**
  * The three.js light as a light of Rebounce, dark if it or something that it is in is invisible;
- * null for one that is neither lamp nor sun.
+ * null for one that is neither lamp nor sun. Throws RebounceError if its decay is not 2.
  */
 export function toLight(light) {
+  if ((light.decay ?? 2) !== 2) {
+    throw new RebounceError(
+        `the light "${light.name}" has a decay of ${light.decay}; set it to 2, the inverse square`);
+  }
   const position = light.getWorldPosition(new THREE.Vector3()).toArray();
   const intensity = isShown(light) ? light.intensity : 0;
   const plain = { position, color: light.color.toArray(), intensity };

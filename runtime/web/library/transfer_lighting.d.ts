@@ -5,7 +5,7 @@ import type { Engine, Light, LoadOptions, Sky, Timings, Transfer } from './rebou
 
 /**
  * The three.js light as a light of Rebounce, dark if it or something that it is in is invisible;
- * null for one that is neither lamp nor sun.
+ * null for one that is neither lamp nor sun. Throws RebounceError if its decay is not 2.
  */
 export function toLight(light: ThreeLight): Light | null;
 
@@ -38,7 +38,10 @@ export class TransferLighting {
   readonly timings: Timings;
   /** How much of direct and of bounced light the mesh shows, 0 to 1. */
   show(direct: number, bounced: number): void;
-  /** Lets a material show bounced light on geometry with the attribute `bouncedIrradiance`. */
+  /**
+   * Lets a material show bounced light on geometry with the attribute `bouncedIrradiance`, and direct
+   * light by the formulas of Rebounce.
+   */
   patch<T extends Material>(material: T): T;
   /**
    * Lets the meshes in and below `object` show bounced light, with all of their attributes and

@@ -2,11 +2,11 @@
 
 import * as THREE from 'three';
 import { SurfaceFitter } from './fitted_mesh.js';
-import { loadTexture, makeMaterial } from './material.js';
+import { loadTextures, makeMaterial } from './material.js';
 import { ProbeGrid } from './probe_grid.js';
 import { Transfer } from './rebounce.js';
 import { Surface } from './surface.js';
-import { toLight, toSky } from './three_lights.js';
+import { replaceLightFormulas, toLight, toSky } from './three_lights.js';
 
 export { toLight };
 
@@ -18,6 +18,11 @@ const lightLoops = THREE.ShaderChunk.lights_fragment_begin.replace(
 
 function castsSoftly(light) {
   return light.type === 'rectangle' || light.type === 'disc' || light.type === 'sphere';
+}
+
+// Glass of three.js that casts no shadow; what emits counts as if nothing passed.
+function isClear({ transmission, emissive }) {
+  return transmission > 0.5 && emissive.getHex() === 0;
 }
 
 /**
@@ -41,17 +46,22 @@ export class TransferLighting {
   /** Loads a transfer file; `onProgress` is told how much of it has come, in [0, 1]. */
   static async load(url, options) {
     const transfer = await Transfer.load(url, options);
-    const textures = await Promise.all(transfer.materials.map(loadTexture));
-    return new TransferLighting(transfer, textures);
+    try {
+      const textures = await Promise.all(transfer.materials.map(loadTextures));
+      return new TransferLighting(transfer, textures);
+    } catch (error) {
+      transfer.dispose();
+      throw error;
+    }
   }
 
   constructor(transfer, textures) {
     this.#transfer = transfer;
-    this.#engine = transfer.createEngine();
     this.#surface = new Surface(transfer.mesh);
     this.#direct = new Float32Array(transfer.mesh.position.length);
     this.probes = transfer.probes ? new ProbeGrid(transfer.probes) : null;
     this.mesh = this.#makeMesh(textures);
+    this.#engine = transfer.createEngine();  // last, so that no failure leaves it behind
   }
 
   get transfer() {
@@ -69,9 +79,10 @@ export class TransferLighting {
     this.#parts.value.set(direct, bounced);
   }
 
-  /** Lets a material of any mesh with the attribute show bounced light. */
+  /** Lets a material show bounced light on any mesh with the attribute, and direct light to match. */
   patch(material) {
     material.onBeforeCompile = (shader) => {
+      replaceLightFormulas(shader);
       shader.uniforms.rebounceParts = this.#parts;
       shader.vertexShader = shader.vertexShader
           .replace('#include <common>',
@@ -176,6 +187,7 @@ reflectedLight.directSpecular *= rebounceParts.x;`);
       if (!copies.has(material)) {
         const copy = this.patch(material.clone());
         copy.side = THREE.FrontSide;  // the second sides of double-sided triangles have their own
+        copy.shadowSide ??= THREE.FrontSide;
         copies.set(material, copy);
       }
       return copies.get(material);
@@ -184,7 +196,8 @@ reflectedLight.directSpecular *= rebounceParts.x;`);
       mesh.geometry = geometry;
       mesh.material = Array.isArray(mesh.material)
           ? mesh.material.map(patched) : patched(mesh.material);
-      mesh.castShadow = mesh.receiveShadow = true;
+      mesh.castShadow = ![mesh.material].flat().every(isClear);
+      mesh.receiveShadow = true;
       this.#attached.push({ mesh, vertices, attribute: this.#addAttribute(geometry) });
     }
     this.#copies.push(...copies.values());
@@ -238,6 +251,7 @@ reflectedLight.directSpecular *= rebounceParts.x;`);
     for (const copy of this.#copies) copy.dispose();
     for (const material of this.mesh.material) {
       material.map?.dispose();
+      material.emissiveMap?.dispose();
       material.dispose();
     }
     this.probes?.dispose();

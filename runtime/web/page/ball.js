@@ -1,6 +1,7 @@
 // A ball that moves through the light: lamps light it as they do all in three.js, and probes bounce.
 
 import * as THREE from 'three';
+import { replaceLightFormulas } from '../library/three_lights.js';
 import { makeRing } from './ring.js';
 
 export class Ball {
@@ -10,6 +11,7 @@ export class Ball {
     this.home = new THREE.Vector3(...position);
     const material = new THREE.MeshStandardMaterial({ color: '#e9e4da', roughness: 0.9 });
     material.onBeforeCompile = (shader) => {
+      replaceLightFormulas(shader);
       shader.uniforms.directPart = this.#direct;
       shader.fragmentShader = shader.fragmentShader
           .replace('#include <common>', '#include <common>\nuniform float directPart;')

@@ -1,7 +1,8 @@
 // The light of a LightProbeGridWebGL where its shader would find it, read back from its texture.
 
-const subVolumes = 7;  // of four floats each, one above the other
-const floats = 28;     // of a probe, the last is unused
+import { subVolumes } from '../library/probe_grid.js';
+
+const floats = 4 * subVolumes;  // of a probe, the last is unused
 
 /** Irradiance of a grid at fixed points. */
 export class GridLight {

@@ -18,7 +18,7 @@ export class Hand {
     const { canvas } = stage;
     // Before the camera's controls hear of it.
     canvas.addEventListener('pointerdown', (event) => {
-      if (this.#held || !event.isPrimary) return;
+      if (this.#held || !event.isPrimary || event.button !== 0) return;
       const thing = this.#thingAt(event);
       if (!thing) return;
       event.stopImmediatePropagation();

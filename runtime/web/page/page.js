@@ -11,9 +11,11 @@ import { Stage } from './stage.js';
 const loading = document.getElementById('loading');
 const message = document.getElementById('message');
 let running = false;  // whether frames are drawn
+let lost = false;     // whether the graphics card was taken away
 let request = 0;      // of the next one
 
 function say(title, text, action) {
+  if (lost) return;
   message.replaceChildren();
   const strong = document.createElement('strong');
   strong.textContent = title;
@@ -31,6 +33,11 @@ function say(title, text, action) {
     message.append(button);
   }
   message.hidden = false;
+}
+
+/** Hides what was said, unless it is that the graphics card is lost. */
+function unsay() {
+  message.hidden = !lost;
 }
 
 function progress(part, title) {
@@ -76,6 +83,7 @@ let panel = null, lastTimings = {};
 
 /** Draws frames from now on. */
 function drawFrames() {
+  if (lost) return;
   running = true;
   cancelAnimationFrame(request);
   request = requestAnimationFrame(frame);
@@ -105,7 +113,7 @@ async function open(id) {
     const file = `scenes/${description.id}.safetensors`;
     if (!await stage.load(description, file, onProgress)) return;
     comparing?.end();
-    message.hidden = true;
+    unsay();
     document.body.classList.add('begun');
     history.replaceState(null, '', `#${description.id}`);
     panel.showScene();
@@ -126,7 +134,7 @@ async function compare(kind, settings = {}) {
   comparing?.end();
   if (!comparisons[kind]) {
     stage.closeComparison();
-    message.hidden = true;
+    unsay();
     panel.showComparison();
     return;
   }
@@ -134,7 +142,7 @@ async function compare(kind, settings = {}) {
   try {
     const file = `scenes/${stage.description.id}.form_factors.safetensors`;
     if (!await stage.openComparison(comparisons[kind], settings, file, onProgress)) return;
-    message.hidden = true;
+    unsay();
     panel.showComparison();
   } catch (error) {
     say('The comparison cannot be shown', error.message,
@@ -155,6 +163,7 @@ function start() {
     running = false;
     say('The graphics card was taken away', 'The picture comes back when the browser gives it back.',
         { title: 'Load the page again', run: reload });
+    lost = true;
   });
   stage.canvas.addEventListener('webglcontextrestored', reload);
   return open(location.hash.slice(1));

@@ -4,7 +4,7 @@
 import * as THREE from 'three';
 import { LightProbeGridWebGL } from 'three/addons/lighting/LightProbeGridWebGL.js';
 import { Side } from './comparison.js';
-import { toLight } from '../library/three_lights.js';
+import { replaceLightFormulas, toLight } from '../library/three_lights.js';
 import { GridLight } from './grid_light.js';
 
 const furtherBounces = 1;  // as in three.js's example of a large scene
@@ -15,8 +15,9 @@ function makePlain(mesh) {
   const materials = mesh.material.map((lit) => {
     // Lambert's, which area lights do not reach, in the shape of the one that they do.
     const plain = new THREE.MeshPhysicalMaterial({ roughness: 1, specularIntensity: 0 });
-    for (const name of ['color', 'emissive', 'vertexColors', 'shadowSide', 'map', 'alphaTest',
-                        'transparent', 'opacity']) {
+    plain.onBeforeCompile = replaceLightFormulas;  // the lamps are those of the other half
+    for (const name of ['color', 'emissive', 'vertexColors', 'shadowSide', 'visible', 'map',
+                        'emissiveMap', 'alphaTest', 'transparent', 'opacity']) {
       plain[name] = lit[name];
     }
     return plain;

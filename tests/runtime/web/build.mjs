@@ -4,6 +4,7 @@ import { execFileSync } from 'node:child_process';
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { lights, roomExposure, roomLights, root, sky, skipWithout, web } from './support.mjs';
+import { texturedScene } from './textured_scene.mjs';
 
 const [, , program, folder] = process.argv;
 skipWithout('/usr/bin/clang++-19', 'clang++-19');
@@ -20,10 +21,18 @@ run('node', join(web, 'pack_module.mjs'), join(module, 'rebounce.wasm'));
 
 const page = join(folder, 'page');
 run('node', join(web, 'build_page.mjs'), page);
+const { build } = await import(join(web, 'node_modules/esbuild/lib/main.js'));
+await build({
+  entryPoints: [join(root, 'tests/runtime/web/drawing.js')], outfile: join(page, 'drawing.js'),
+  bundle: true, format: 'esm', target: 'es2022', nodePaths: [join(web, 'node_modules')],
+  logLevel: 'error',
+});
+writeFileSync(join(page, 'drawing.html'), `<!doctype html><link rel="icon" href="data:,">
+<script type="module" src="drawing.js"></script>`);
 const scene = join(folder, 'cornell_box.safetensors');
-const precompute = (name, file, ...options) => run(
-    program, 'precompute', `tests/scenes/${name}.gltf`, '--patches', '500', '--quiet', '-o', file,
-    ...options);
+const precomputeFile = (path, file, ...options) => run(
+    program, 'precompute', path, '--patches', '500', '--quiet', '-o', file, ...options);
+const precompute = (name, ...rest) => precomputeFile(`tests/scenes/${name}.gltf`, ...rest);
 precompute('cornell_box', scene);
 precompute('cornell_box', join(page, 'scenes/cornell_box.safetensors'), '--for', 'web',
            '--compress-form-factors', '0.001', '--probes', '4,4,4', '--probe-rays', '96');
@@ -31,6 +40,9 @@ precompute('cornell_box', join(page, 'scenes/cornell_box.safetensors'), '--for',
 precompute('furnished_room', join(folder, 'room.safetensors'), '--receivers-at', 'patches');
 precompute('furnished_room', join(page, 'scenes/furnished_room.safetensors'), '--for', 'web');
 precompute('pavilion', join(folder, 'pavilion.safetensors'));
+const textured = join(page, 'scenes/textured.gltf');
+writeFileSync(textured, texturedScene);
+precomputeFile(textured, join(page, 'scenes/textured.safetensors'), '--for', 'web');
 writeFileSync(join(folder, 'room_lights.json'), JSON.stringify({ lights: roomLights }));
 run(program, 'render', join(folder, 'room.safetensors'), '--lights', join(folder, 'room_lights.json'),
     '--show', 'indirect', '--exposure', String(roomExposure), '--size', '320x240', '--quiet', '-o',

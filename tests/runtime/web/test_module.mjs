@@ -224,6 +224,26 @@ test('600 frames and 20 loads take no further memory', async () => {
   assert.ok(instance.memoryBytes <= before + (1 << 20), 'what is disposed of is free');
 });
 
+test('addresses beyond 2 GiB give the same light', async () => {
+  const instance = await Instance.get();
+  const lightOf = async () => {
+    const transfer = await load();
+    const engine = transfer.createEngine();
+    engine.relight(lights, sky);
+    const light = engine.indirectIrradiance(), copy = light.slice();
+    assert.throws(() => engine.relight([{ intensity: -1 }]), /intensity/);
+    engine.dispose();
+    transfer.dispose();
+    return { copy, address: light.byteOffset };
+  };
+  const below = await lightOf();
+  const held = Array.from({ length: 4 }, () => instance.allocate(2 ** 29));
+  const beyond = await lightOf();
+  for (const address of held) instance.release(address);
+  assert.ok(below.address < 2 ** 31 && beyond.address > 2 ** 31, `${beyond.address}`);
+  assert.deepEqual(beyond.copy, below.copy);
+});
+
 test('the module is small', () => {
   const text = readFileSync(join(web, 'library/wasm.js'), 'utf8');
   const packed = Buffer.from(/'([^']+)'/.exec(text)[1], 'base64');

@@ -5,6 +5,7 @@ import { copyFileSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { after, afterEach, before, test } from 'node:test';
 import { chromiumPath, launchArguments, lights, roomExposure, roomLights, skipWithout, web } from './support.mjs';
+import { emitted, reflectance } from './textured_scene.mjs';
 
 const folder = process.argv[2];
 skipWithout(join(folder, 'native.csv'), 'page; see the test WebBuild');
@@ -31,7 +32,7 @@ afterEach(async () => {
 });
 
 /** Opens the page; `faults` gathers what it says on its console. */
-async function open(viewport = { width: 640, height: 480 }, prepare = () => {}) {
+async function open(viewport = { width: 640, height: 480 }, prepare = () => {}, name = '') {
   const page = await browser.newPage({ viewport });
   page.setDefaultTimeout(120000);  // drawing is slow without a graphics card
   opened.push(page);
@@ -41,7 +42,7 @@ async function open(viewport = { width: 640, height: 480 }, prepare = () => {}) 
     if (message.type() === 'error') faults.push(message.text());
   });
   await prepare(page);
-  await page.goto(server.url);
+  await page.goto(server.url + name);
   return { page, faults };
 }
 
@@ -98,6 +99,22 @@ test('it loads without a fault, and a lamp that is dragged takes its light along
   assert.ok(inTheSameFrame.same, 'the light was that of the lamp where it is');
   assert.notEqual(await sum(page), light);
   assert.ok(!shown.equals(await page.locator('#view').screenshot()), 'the picture has changed');
+  assert.deepEqual(faults, []);
+});
+
+test('the first button alone takes hold of a lamp', async () => {
+  const { page, faults } = await openReady();
+  const lamp = await lampPlace(page);
+  const place = () => page.evaluate(() => window.rebounce.stage.lamps[0].object.position.toArray());
+  const before = await place();
+  await page.mouse.move(lamp.x, lamp.y);
+  for (const button of ['right', 'middle']) {
+    await page.mouse.down({ button });
+    await page.mouse.move(lamp.x - 30, lamp.y + 20);
+    await page.mouse.up({ button });
+    assert.deepEqual(await place(), before, button);
+    await page.mouse.move(lamp.x, lamp.y);
+  }
   assert.deepEqual(faults, []);
 });
 
@@ -200,6 +217,36 @@ test('bounced light looks as `rebounce render` draws it', async () => {
   assert.ok(compared > 0.6 * 320 * 240, `${compared} pixels lie within surfaces`);
   // Silhouettes before what is nearly as bright are taken for surfaces: one in a few thousand.
   assert.ok(off < compared / 2000, `of ${compared} pixels ${off} are off by more than 2 of 255`);
+});
+
+test('a surface is drawn with its textures, by the formulas of the light that it bounces', async () => {
+  const { page, faults } = await open(undefined, undefined, 'drawing.html');
+  const { file, own, casts } = await page.evaluate(() => window.drawn);
+  const count = file.dark.length / 3;
+  const squaredFrom = (k, z) => ((k + 0.5) / count - 0.5) ** 2 + (0.5 / count) ** 2 + z * z;
+  // The lamps of drawing.js on the wall, in lx.
+  const spot = (k) => {
+    const squared = squaredFrom(k, 0.9), cosine = 0.9 / Math.sqrt(squared);
+    const [outer, inner] = [Math.cos(0.5), Math.cos(0.5 * (1 - 0.6))];
+    const inside = Math.min(Math.max((cosine - outer) / (inner - outer), 0), 1) ** 2;
+    return 2 * cosine / squared * inside * Math.max(0, 1 - (squared / 1.1 ** 2) ** 2);
+  };
+  const near = (k) => 0.01 * 0.05 / squaredFrom(k, 0.05) ** 1.5;
+  for (const [name, light] of Object.entries({ spot, near })) {
+    const expected = file.dark.map((dark, k) =>
+        dark + reflectance / Math.PI * light(Math.floor(k / 3)));
+    const most = Math.max(...expected.map((value, k) => value - file.dark[k]));
+    const off = (drawn) => Math.max(...drawn.map((value, k) => Math.abs(value - expected[k]))) / most;
+    assert.ok(off(file[name]) < 0.01, `${name}: off by ${off(file[name])}`);
+    // A standard material is a little glossy.
+    assert.ok(off(own[name]) < 0.1, `${name}, on a mesh of its own: off by ${off(own[name])}`);
+  }
+  [count / 4, 3 * count / 4].forEach((pixel, half) => {
+    const drawn = file.dark.slice(3 * pixel, 3 * pixel + 3);
+    assert.ok(drawn.every((value, c) => Math.abs(value - emitted[half][c]) < 0.05), `${drawn}`);
+  });
+  assert.deepEqual(casts, [true, false]);
+  assert.deepEqual(faults, []);
 });
 
 test('Gauss-Seidel beside falls behind a switched lamp, and catches up', async () => {
@@ -562,4 +609,15 @@ test('a browser that lacks what it needs, and a lost context, have a message', a
   await page.evaluate(() => window.rebounce.stage.renderer.forceContextLoss());
   await page.waitForSelector('#message:not([hidden])');
   assert.match(await page.textContent('#message'), /graphics card/);
+  // A scene that comes late says and draws nothing.
+  await page.evaluate(() => {
+    window.drawn = 0;
+    window.rebounce.stage.frame = () => ++window.drawn;
+    document.querySelector('#scenes [data-scene=furnished_room]').click();
+  });
+  await page.waitForFunction(() => location.hash === '#furnished_room');
+  await frames(page);
+  assert.match(await page.textContent('#message'), /graphics card/);
+  assert.ok(await page.locator('#message').isVisible());
+  assert.equal(await page.evaluate(() => window.drawn), 0);
 });

@@ -14,7 +14,7 @@ globalThis.ProgressEvent ??= class extends Event {};
 
 const THREE = await import(join(web, 'node_modules/three/build/three.module.js'));
 const { GLTFLoader } = await import(join(web, 'node_modules/three/examples/jsm/loaders/GLTFLoader.js'));
-const { RebounceError } = await import(join(web, 'library/rebounce.js'));
+const { RebounceError, Transfer } = await import(join(web, 'library/rebounce.js'));
 const { TransferLighting, toLight } = await import(join(web, 'library/transfer_lighting.js'));
 const { toSky } = await import(join(web, 'library/three_lights.js'));
 
@@ -116,6 +116,54 @@ test('a group without an end is cut as a mesh without groups is', async () => {
   lighting.dispose();
 });
 
+test('a mesh that is far larger than the surface is refused at once', async () => {
+  const lighting = await load('cornell_box');
+  const far = new THREE.Mesh(new THREE.PlaneGeometry(1e6, 1e6));
+  assert.throws(() => lighting.attach(far), /does not fit cornell_box/);
+  lighting.dispose();
+});
+
+test('attached meshes cast the shadows of the surface', async () => {
+  const lighting = await load('cornell_box');
+  const scene = await sceneOf('cornell_box');
+  const [first] = meshesOf(scene);
+  first.material = first.material.clone();
+  first.material.shadowSide = THREE.DoubleSide;
+  lighting.attach(scene);
+  for (const { material: { shadowSide } } of meshesOf(scene).slice(1)) {
+    assert.equal(shadowSide, lighting.mesh.material[0].shadowSide);
+  }
+  assert.equal(first.material.shadowSide, THREE.DoubleSide, 'what was chosen stays');
+  lighting.dispose();
+});
+
+test('textures are decoded as they are, for their own coordinates; clear glass is not drawn', async (t) => {
+  const asked = [];
+  globalThis.createImageBitmap = async (_, options) => asked.push(options);
+  t.after(() => delete globalThis.createImageBitmap);
+  const lighting = await load('textured');
+  const [wall, glass] = lighting.mesh.material;
+  assert.deepEqual(asked, Array(2).fill({ premultiplyAlpha: 'none', colorSpaceConversion: 'none' }));
+  assert.deepEqual([wall.map.channel, wall.emissiveMap.channel, glass.map], [0, 1, null]);
+  assert.deepEqual([wall.visible, glass.visible], [true, false]);
+  const left = new Set([wall.map, wall.emissiveMap]);
+  for (const one of left) one.addEventListener('dispose', () => left.delete(one));
+  lighting.dispose();
+  assert.equal(left.size, 0);
+});
+
+test('an image that cannot be decoded is refused, and leaves nothing in memory', async (t) => {
+  globalThis.createImageBitmap = async () => { throw new Error('no image'); };
+  t.after(() => delete globalThis.createImageBitmap);
+  const { mock } = t.mock.method(Transfer.prototype, 'dispose');
+  await assert.rejects(load('textured'), (error) => {
+    assert.ok(error instanceof RebounceError);
+    assert.match(error.message, /image of the material "wall" .*no image/);
+    return true;
+  });
+  assert.equal(mock.callCount(), 1);
+});
+
 test('all that it has made is disposed of with it, and it lights no more', async () => {
   const lighting = await load('cornell_box');
   const scene = await sceneOf('cornell_box');
@@ -152,6 +200,16 @@ test('all lights of three.js that stand in a scene are taken', () => {
     new THREE.RectAreaLight(), new THREE.AmbientLight(),
   ].map((light) => toLight(light)?.type);
   assert.deepEqual(types, ['point', 'spot', 'directional', 'rectangle', undefined]);
+});
+
+test('a lamp that does not decay with the square is refused', () => {
+  const lamp = new THREE.SpotLight('white', 5, 0, 0.5, 0, 1);
+  lamp.name = 'key';
+  assert.throws(() => toLight(lamp), (error) => {
+    assert.ok(error instanceof RebounceError);
+    assert.match(error.message, /"key" has a decay of 1; set it to 2/);
+    return true;
+  });
 });
 
 test('a hemisphere light is a sky above a ground', async () => {
