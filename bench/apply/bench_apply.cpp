@@ -64,7 +64,7 @@ class ApplyBenchmark {
       const Timing& time = timings[k];
       const double rate = measure.reads * measure.bytes / time.median;
       const auto n = static_cast<double>(data_->patches.size());
-      table.add({scene_name(*data_), data_->patches.size(), transfer_.kind(),
+      table.add({scene_name(*data_), data_->patches.size(), operator_name(transfer_.kind()),
                  data_->record.error_mean, threads, measure.name, time.median * 1e6, time.spread,
                  measure.bytes, measure.bytes / n, rate / 1e9, rate / read_rate,
                  rate / memory_bandwidth_});

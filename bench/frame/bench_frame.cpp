@@ -1,12 +1,12 @@
 // bench_frame: the stages of a frame: direct light, the product, outputs.
 
-#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <utility>
 
 #include "bench/frame/direct_cases.h"
 #include "bench/support/input.h"
+#include "bench/support/light_changes.h"
 #include "bench/support/program.h"
 #include "bench/support/timing.h"
 #include "precompute/import/import_gltf.h"
@@ -35,28 +35,15 @@ struct FrameOptions {
   CommonOptions common{.repeats = 31};
 };
 
-/// Lights in two places each, so that every run finds them moved.
-class MovingLights {
- public:
-  MovingLights(const Engine& engine, std::size_t count, std::size_t moving)
-      : moving_(std::min(count, moving)) {
-    const int twice = static_cast<int>(2 * count);
-    const std::vector<Light> all =
-        random_point_lights(engine.data(), *engine.parts().tracer, twice, 7);
-    lights_.assign(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count));
-    elsewhere_.assign(all.begin() + static_cast<std::ptrdiff_t>(count), all.end());
-  }
-
-  std::span<const Light> next() {
-    for (std::size_t k = 0; k < moving_; ++k)
-      std::swap(lights_[k].position, elsewhere_[k].position);
-    return lights_;
-  }
-
- private:
-  std::size_t moving_;
-  std::vector<Light> lights_, elsewhere_;
-};
+MovingLamps random_lamps(const Engine& engine, std::size_t count, std::size_t moving_count) {
+  MovingLamps result;
+  result.lamps = random_point_lights(engine.data(), *engine.parts().tracer,
+                                     static_cast<int>(count + moving_count), 7);
+  const auto rest = result.lamps.begin() + static_cast<std::ptrdiff_t>(count);
+  result.elsewhere.assign(rest, result.lamps.end());
+  result.lamps.erase(rest, result.lamps.end());
+  return result;
+}
 
 class FrameBenchmark {
  public:
@@ -80,7 +67,7 @@ class FrameBenchmark {
     names_.clear();
     cases_.clear();
     for (const std::size_t count : kLightCounts) add_lights(count);
-    engine_.relight(MovingLights(engine_, kLitCount, 0).next(), {});  // light for what follows
+    engine_.relight(random_lamps(engine_, kLitCount, 0).lamps, {});  // light for what follows
     add("initial exitance", {}, [this] { engine_.parts().compute_initial_exitance(); });
     add("product", {}, [this] { engine_.parts().apply_transfer(); });
     add("radiosity", {}, [this] { engine_.parts().compute_radiosity(); });
@@ -107,12 +94,13 @@ class FrameBenchmark {
   }
 
   void add_lights(std::size_t count) {
-    const auto none = std::make_shared<MovingLights>(engine_, count, 0);
     const auto still = std::make_shared<Engine>(engine_);
-    add("direct, none moved", count,
-        [still, none] { still->parts().compute_direct(none->next(), {}); });
+    add("direct, none moved", count, [still, lamps = random_lamps(engine_, count, 0).lamps] {
+      still->parts().compute_direct(lamps, {});
+    });
+    if (count < kMovingCount) return;
     // The whole frame keeps its own engine: what does not move is known from its last frame.
-    const auto some = std::make_shared<MovingLights>(engine_, count, kMovingCount);
+    const auto some = std::make_shared<MovingLamps>(random_lamps(engine_, count, kMovingCount));
     const auto own = std::make_shared<Engine>(engine_);
     add("frame, two moved", count, [this, own, some] {
       own->relight(some->next(), {});
@@ -184,9 +172,9 @@ void run_direct(const TransferData& data, const CommonOptions& options, int thre
              {}});
   for (std::size_t k = 0; k < direct.rows().size(); ++k) {
     const DirectCases::Row& row = direct.rows()[k];
-    table.add({name, data.patches.size(), threads, row.name, row.lights, microseconds(1 + 2 * k),
-               timings[1 + 2 * k].spread, microseconds(2 + 2 * k), row.errors.mean,
-               row.errors.largest});
+    table.add({name, data.patches.size(), threads, row.name, row.lights,
+               microseconds(1 + 2 * k) / DirectCases::kRuns, timings[1 + 2 * k].spread,
+               microseconds(2 + 2 * k) / DirectCases::kRuns, row.errors.mean, row.errors.largest});
   }
 }
 
@@ -205,6 +193,7 @@ void run(const FrameOptions& options) {
   Table table({"scene", "patches", "threads", "stage", "lights", "microseconds", "spread",
                "all traced", "error", "largest error"});
   if (options.direct_only) {
+    require_scenes(options.input);
     for (const std::string& scene : options.input.inputs) {
       for (const std::size_t count : options.input.patch_counts) {
         const TransferData data = patches_of(scene, count);
@@ -234,7 +223,7 @@ int main(int argc, char** argv) {
   CLI::App app("Times the stages of a frame, with 1, 4 and 16 lights.", "bench_frame");
   rebounce::bench::add_input_options(app, options.input);
   app.add_flag("--direct-only", options.direct_only,
-               "Direct light alone, of scenes whose operator is not built");
+               "Direct light alone, of scenes; no operator is built");
   app.add_option("--probes", options.input.settings.probes.spacing,
                  "Light probes this many metres apart, of scenes that are built")
       ->check(CLI::PositiveNumber);

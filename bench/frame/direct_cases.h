@@ -28,10 +28,12 @@ class DirectCases {
   struct Row {
     std::string name;
     std::size_t lights;
-    DirectErrors errors;  ///< over 64 lamps of the type
+    DirectErrors errors;  ///< over those of 64 lamps of the type that light anything
   };
   const std::vector<Row>& rows() const { return rows_; }
 
+  /// Runs of each case: with the lamps in either place.
+  static constexpr int kRuns = 2;
   /// Two cases for each row: by the runtime, and with all points traced.
   void add_to(std::vector<TimedCase>& cases);
 

@@ -172,7 +172,7 @@ class GpuBenchmark {
 
  private:
   static constexpr const char* kProduct = "product";
-  static constexpr const char* kFrame = "frame";
+  static constexpr const char* kFrame = "frame without shadow maps";
   static constexpr const char* kCalls = "calls of a frame";
 
   static bool is_of_product(const std::string& stage) {
@@ -225,7 +225,7 @@ class GpuBenchmark {
         {.work = [&] { engine_.parts().compute_radiosity(); }},
         {.work = [&] { vertex_irradiance(engine_, at_vertices); }},
     };
-    processor_ = time_interleaved(cases, {.rounds = 11});
+    processor_ = time_interleaved(cases, {.rounds = options_.common.repeats});
     const std::vector<float>& area = engine_.data().patches.area;
     engine_.relight(lights_, {});
     direct_difference_ = relative_difference(direct_.read(), engine_.direct_irradiance(), area);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "bench/receivers/exact_light.h"
 #include "bench/support/input.h"
 #include "bench/support/program.h"
 #include "bench/support/timing.h"
@@ -25,11 +26,11 @@ constexpr std::uint64_t kSeed = 77;  // not that of the lights that sets are cho
 constexpr double kLeastArriving = 0.1;
 
 struct Options {
-  InputOptions input;
+  InputOptions input{.patch_counts = {4000}};
   CommonOptions common{.repeats = 11};
   std::vector<double> tolerances{ReceiverRowSettings{}.tolerance};
   std::vector<std::uint32_t> sets{ReceiverRowSettings{}.most_sets};
-  ReceiverRowSettings rows;
+  ReceiverRowSettings rows{.least_error = 0};
   int lights = 64;  ///< of each kind
 };
 
@@ -43,6 +44,37 @@ std::vector<double> vertex_areas(const DisplayMesh& mesh) {
   return area;
 }
 
+/// Those of each tolerance and number of sets.
+std::vector<ReceiverRowSettings> row_settings(const Options& options) {
+  std::vector<ReceiverRowSettings> all;
+  for (const double tolerance : options.tolerances) {
+    for (const std::uint32_t sets : options.sets) {
+      ReceiverRowSettings& settings = all.emplace_back(options.rows);
+      settings.tolerance = tolerance;
+      settings.most_sets = sets;
+      check_receiver_rows(settings);
+    }
+  }
+  return all;
+}
+
+double bytes_of(const ReceiverRows& rows) {
+  std::size_t bytes = 0;
+  const auto add = [&](const auto& list) { bytes += std::span(list).size_bytes(); };
+  add(rows.patch);
+  add(rows.set);
+  add(rows.group_begin);
+  add(rows.entry_set);
+  add(rows.scale);
+  add(rows.receiver);
+  add(rows.value);
+  return static_cast<double>(bytes);
+}
+
+double mean(std::span<const double> values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
 class ReceiverBenchmark {
  public:
   ReceiverBenchmark(const TransferData& data, const Options& options)
@@ -50,18 +82,16 @@ class ReceiverBenchmark {
         options_(options),
         tracer_(make_surface_tracer(data.mesh)),
         area_(vertex_areas(data.mesh)),
-        exact_(make({0.0, ReceiverRows::kMostSets}).rows) {
-    for (const std::uint32_t v : exact_.receiver) {
-      if (v != kNone) compared_.push_back(v);
-    }
-  }
+        exact_(data, tracer_, options.rows.ray_count) {}
 
-  void run(Table& table) {
-    for (const double tolerance : options_.tolerances) {
-      for (const std::uint32_t sets : options_.sets) {
-        const Made made = make({tolerance, sets});
-        for (const LightKind kind : kLightKinds) add_row(made, tolerance, sets, kind, table);
-      }
+  void run(std::span<const ReceiverRowSettings> settings, Table& table) {
+    if (exact_.vertices().empty()) {  // none is small against patches
+      return table.add(
+          {scene_name(data_), data_.patches.size(), {}, {}, {}, {}, {}, {}, {}, 0, 0, {}, {}, {}});
+    }
+    for (const ReceiverRowSettings& of_rows : settings) {
+      const Made made = make(of_rows);
+      for (const LightKind kind : kLightKinds) add_row(made, of_rows, kind, table);
     }
   }
 
@@ -71,10 +101,7 @@ class ReceiverBenchmark {
     double seconds = 0;
   };
 
-  Made make(std::pair<double, std::uint32_t> limits) const {
-    ReceiverRowSettings settings = options_.rows;
-    std::tie(settings.tolerance, settings.most_sets) = limits;
-    settings.least_error = 0;
+  Made make(const ReceiverRowSettings& settings) const {
     Made made;
     made.seconds = seconds_of([&] {
       made.rows = make_receiver_rows(data_, data_.mesh.triangle_patch,
@@ -107,7 +134,7 @@ class ReceiverBenchmark {
   double difference(std::span<const Float3> light, std::span<const Float3> truth,
                     std::span<const Float3> of_patches) const {
     double off = 0, area = 0;
-    for (const std::uint32_t v : compared_) {
+    for (const std::uint32_t v : exact_.vertices()) {
       area += area_[v];
       for (std::size_t c = 0; c < kChannelCount; ++c) {
         const double d = static_cast<double>(light[v][c]) - truth[v][c];
@@ -120,7 +147,7 @@ class ReceiverBenchmark {
     return usual > 0 ? std::sqrt(off / area) / usual : 0;
   }
 
-  void add_row(const Made& made, double tolerance, std::uint32_t sets, LightKind kind,
+  void add_row(const Made& made, const ReceiverRowSettings& settings, LightKind kind,
                Table& table) {
     const auto lights = random_initial_exitances(data_, tracer_, kind, options_.lights, kSeed);
     if (lights.empty()) return;
@@ -131,50 +158,43 @@ class ReceiverBenchmark {
     for (std::size_t k = 0; k < lights.size(); ++k) {
       data_.transfer->apply(lights[k], indirect, workspace);
       if (flux_of(indirect) < kLeastArriving * flux_of(lights[k])) continue;
-      const std::vector<Float3> truth = shown(exact_, indirect, radiosities[k]);
+      const std::vector<Float3> truth = exact_.light(indirect, radiosities[k]);
       error.push_back(difference(shown(made.rows, indirect, radiosities[k]), truth, indirect));
       of_weights.push_back(difference(shown({}, indirect, radiosities[k]), truth, indirect));
     }
-    const auto mean = [](std::span<const double> values) {
-      double sum = 0;
-      for (const double value : values) sum += value;
-      return sum / static_cast<double>(values.size());
-    };
-    const auto receivers = static_cast<double>(compared_.size());
-    const double bytes = static_cast<double>(made.rows.value.size() + 8 * made.rows.scale.size() +
-                                             4 * made.rows.receiver.size()) /
-                         receivers;
+    if (error.empty()) return;
+    const std::size_t compared = exact_.vertices().size();
+    const auto receivers = static_cast<double>(compared);
     const std::size_t with_rows =
         made.rows.receiver.size() -
         static_cast<std::size_t>(std::ranges::count(made.rows.receiver, kNone));
-    if (error.empty()) return;
-    table.add({scene_name(data_), data_.patches.size(), tolerance, sets, std::string(name(kind)),
-               mean(of_weights), std::ranges::max(of_weights), mean(error), std::ranges::max(error),
-               compared_.size(), with_rows, bytes, made.seconds,
-               time_of(made.rows, indirect) / receivers * 1e6});
+    table.add({scene_name(data_), data_.patches.size(), settings.tolerance, settings.most_sets,
+               name(kind), mean(of_weights), std::ranges::max(of_weights), mean(error),
+               std::ranges::max(error), compared, with_rows, bytes_of(made.rows) / receivers,
+               made.seconds, time_of(made.rows, indirect) / receivers * 1e6});
   }
 
   double time_of(const ReceiverRows& rows, std::span<const Float3> radiosity) const {
     ReceiverProducts products(rows, data_.patches.area);
     std::vector<Float3> light(data_.mesh.position.size());
     const std::vector<TimedCase> cases{{[&] { products.add(radiosity, light); }}};
-    return time_interleaved(cases, {.rounds = options_.common.repeats}).front().minimum;
+    return time_interleaved(cases, {.rounds = options_.common.repeats}).front().median;
   }
 
   const TransferData& data_;
   const Options& options_;
   RayTracer tracer_;
   std::vector<double> area_;  ///< [v]
-  ReceiverRows exact_;
-  std::vector<std::uint32_t> compared_;
+  ExactLight exact_;
 };
 
 void run(const Options& options) {
+  const std::vector<ReceiverRowSettings> settings = row_settings(options);
   Table table({"scene", "patches", "tolerance", "sets", "lights", "weights_mean", "weights_max",
                "rows_mean", "rows_max", "receivers", "with_rows", "bytes_per_receiver", "seconds",
                "microseconds_per_receiver"});
   for_each_input(options.input, [&](const std::shared_ptr<const TransferData>& data) {
-    ReceiverBenchmark(*data, options).run(table);
+    ReceiverBenchmark(*data, options).run(settings, table);
     save("bench_receivers", table, options.common);
   });
   publish("bench_receivers", table, options.common);
@@ -193,7 +213,9 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--receiver-rays", options.rows.ray_count, "Rays of each vertex")
       ->capture_default_str();
-  app.add_option("--lights", options.lights, "Lights of each kind")->capture_default_str();
+  app.add_option("--lights", options.lights, "Lights of each kind")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
   add_common_options(app, options.common);
   return rebounce::bench::run_program(app, argc, argv, options.common,
                                       [&] { rebounce::bench::run(options); });

@@ -6,6 +6,7 @@
 #include <glm/glm.hpp>
 
 #include "bench/reference/error_sum.h"
+#include "bench/reference/mesh_value.h"
 #include "precompute/outputs/sensor_view.h"
 #include "precompute/patches/hit_patch.h"
 #include "precompute/sampling/hemisphere_rays.h"
@@ -95,17 +96,6 @@ class PlaceViewer {
   std::vector<SeenPlace> seen_;
   CoincidenceScratch scratch_;
 };
-
-/// The value at `position` on a triangle of values at vertices.
-glm::dvec3 interpolated(const DisplayMesh& mesh, std::span<const Float3> at_vertices,
-                        std::uint32_t triangle, const glm::dvec3& position) {
-  const glm::dvec3 weight = weights_at(corners_of(mesh, triangle), position);
-  glm::dvec3 sum(0);
-  for (std::size_t k = 0; k < 3; ++k) {
-    sum += weight[static_cast<int>(k)] * to_dvec3(at_vertices[mesh.triangle[triangle][k]]);
-  }
-  return sum;
-}
 
 /// What the rays of a point bring it in the four ways.
 struct PointLight {

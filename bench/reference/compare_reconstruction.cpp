@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <optional>
 
 #include "bench/reference/compare.h"
 #include "bench/reference/error_sum.h"
+#include "bench/reference/mesh_value.h"
 #include "bench/reference/scene_surface.h"
 #include "precompute/patches/lit_sides.h"
 #include "precompute/sampling/hemisphere_rays.h"
@@ -29,21 +29,15 @@ constexpr double kLeastSeen = 0.05, kSight = 1.0 / 64;
 
 constexpr std::size_t kSightRays = 256;
 
-/// A point of the display mesh.
-struct MeshPoint {
-  std::uint32_t triangle;
-  glm::dvec3 weight;  ///< barycentric, of its three vertices
-};
-
 /// Finds points of the scene on the display mesh.
 class MeshLocator {
  public:
   /// Both must outlive it.
   MeshLocator(const DisplayMesh& mesh, const RayTracer& tracer) : mesh_(mesh), tracer_(tracer) {}
 
-  /// The place of `point`; nothing where the mesh has no such side. Of copies that lie in one
+  /// The triangle of `point`, or kNone where the mesh has no such side. Of copies that lie in one
   /// another one that has a patch, if any has.
-  std::optional<MeshPoint> locate(const SurfacePoint& point) {
+  std::uint32_t locate(const SurfacePoint& point) {
     find_coincident_sides(
         tracer_, point.position, point.normal, kNone,
         [&](std::uint32_t t) { return mesh_.back_triangle[t] != kNone; }, hits_, sides_);
@@ -54,8 +48,7 @@ class MeshLocator {
       if (glm::dot(normal, to_dvec3(point.normal)) < kSameSideCosine) continue;
       if (found == kNone || mesh_.triangle_patch[found] == kNone) found = t;
     }
-    if (found == kNone) return {};
-    return MeshPoint{found, weights_at(corners_of(mesh_, found), to_dvec3(point.position))};
+    return found;
   }
 
  private:
@@ -91,16 +84,6 @@ class Sight {
   std::vector<Hit> hits_;
 };
 
-Float3 interpolated(const DisplayMesh& mesh, std::span<const Float3> at_vertices,
-                    const MeshPoint& point) {
-  glm::dvec3 value(0);
-  for (int corner = 0; corner < 3; ++corner) {
-    value += point.weight[corner] *
-             to_dvec3(at_vertices[mesh.triangle[point.triangle][static_cast<std::size_t>(corner)]]);
-  }
-  return to_float3(value);
-}
-
 }  // namespace
 
 ReconstructionComparison compare_reconstruction(const TransferData& data,
@@ -127,14 +110,15 @@ ReconstructionComparison compare_reconstruction(const TransferData& data,
   ReconstructionComparison comparison;
   std::size_t left_out = 0;
   for (std::size_t k = 0; k < points.size(); ++k) {
-    const std::optional<MeshPoint> place = locator.locate(points[k]);
-    if (!place || truth.absorbed[k] > kHidden) {
+    const std::uint32_t triangle = locator.locate(points[k]);
+    if (triangle == kNone || truth.absorbed[k] > kHidden) {
       ++left_out;
       continue;
     }
-    const Float3 shown = interpolated(data.mesh, at_vertices, *place);
+    const Float3 shown =
+        to_float3(interpolated(data.mesh, at_vertices, triangle, to_dvec3(points[k].position)));
     comparison.point.push_back(static_cast<std::uint32_t>(k));
-    comparison.triangle.push_back(place->triangle);
+    comparison.triangle.push_back(triangle);
     comparison.shown.push_back(shown);
     sum.add(1, shown, truth.mean[k], truth.standard_error[k]);
     if (sight.sees(points[k])) seen.add(1, shown, truth.mean[k], truth.standard_error[k]);

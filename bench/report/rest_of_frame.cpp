@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <utility>
 
 #include "bench/support/light_changes.h"
 #include "rebounce/error.h"
@@ -18,29 +17,19 @@ namespace {
 constexpr std::size_t kLampCount = 4, kMovingCount = 2;
 constexpr int kLeastRounds = 15;  // the work is short
 
-/// The lamps; the first ones have two places between which they change.
-struct TwoPlaces {
-  std::vector<Light> lamps, elsewhere;
-
-  std::span<const Light> next() {
-    for (std::size_t k = 0; k < kMovingCount; ++k) std::swap(lamps[k], elsewhere[k]);
-    return lamps;
-  }
-};
-
-TwoPlaces place_lamps(const Contenders& contenders, std::uint64_t seed) {
+MovingLamps place_lamps(const Contenders& contenders, std::uint64_t seed) {
   const TransferData& data = *contenders.data;
   const double diagonal = box_around(data.mesh.position).diagonal();
   const auto places = lamps_in_the_open(data, *contenders.tracer, 8 * kLampCount, seed);
   if (places.size() < 2 * kMovingCount) throw Error("the report finds no places for its lamps");
-  TwoPlaces result;
+  MovingLamps result;
   for (std::size_t k = 0; k < kLampCount; ++k) {
     const auto lamp_at = [&](std::size_t place) {
       const Float3& target = data.patches.centroid[(k * data.patches.size()) / kLampCount];
       return lamp_of_type(kLampTypes[k], places[place % places.size()], target, diagonal);
     };
     result.lamps.push_back(lamp_at(2 * k));
-    result.elsewhere.push_back(lamp_at(2 * k + 1));
+    if (k < kMovingCount) result.elsewhere.push_back(lamp_at(2 * k + 1));
   }
   return result;
 }
@@ -50,7 +39,7 @@ TwoPlaces place_lamps(const Contenders& contenders, std::uint64_t seed) {
 RestOfFrame measure_rest_of_frame(const Contenders& contenders, const ReportSettings& settings,
                                   const ReportProgress& progress) {
   if (!progress("the rest of a frame", 0)) throw Cancelled();
-  TwoPlaces lamps = place_lamps(contenders, settings.seed);
+  MovingLamps lamps = place_lamps(contenders, settings.seed);
   Engine engine(contenders.data);
   engine.relight(lamps.next(), {});
   std::vector<Float3> vertices(contenders.data->mesh.position.size());

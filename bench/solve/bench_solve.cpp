@@ -1,7 +1,7 @@
 // bench_solve: sweeps over every form of the form factors; and what a file promises, tried: its
 // operator under many fresh lights.
 
-#include <fstream>
+#include <initializer_list>
 
 #include "bench/solve/light_errors.h"
 #include "bench/solve/sweep_times.h"
@@ -61,10 +61,17 @@ void run(const SolveOptions& options) {
   for_each_input(options.input, [&](const std::shared_ptr<const TransferData>& data) {
     measure(*data, options, table, single);
     save("bench_solve", table, options.common);
-    if (options.light_errors.each.empty()) return;
-    std::ofstream(options.light_errors.each) << single.csv();
+    if (!options.light_errors.each.empty()) write_text(options.light_errors.each, single.csv());
   });
   publish("bench_solve", table, options.common);
+}
+
+/// Throws CLI::ValidationError if one of these is given, which `part` does not heed.
+void refuse(const CLI::App& app, const std::string& part,
+            std::initializer_list<const char*> options) {
+  for (const char* option : options) {
+    if (app.count(option) > 0) throw CLI::ValidationError(option, "is not for --part " + part);
+  }
 }
 
 }  // namespace
@@ -96,11 +103,15 @@ int main(int argc, char** argv) {
   app.add_flag("--iterate", options.light_errors.iterate,
                "Their truth by conjugate gradients alone, without an inverse");
   add_common_options(app, options.common);
-  return run_program(app, argc, argv, options.common, [&] {
-    if (options.part == kLightErrors) {
+  app.callback([&] {
+    if (options.part == kSweeps) {
+      refuse(app, kSweeps, {"--lights", "--seed", "--each", "--truth", "--iterate"});
+      options.input.with_form_factors = true;
+    } else {
+      refuse(app, kLightErrors, {"--form-factor-tolerance", "--repeats"});
       options.input.with_truth = options.light_errors.truth.empty();
       options.common.repeats = 1;
     }
-    run(options);
   });
+  return run_program(app, argc, argv, options.common, [&] { run(options); });
 }

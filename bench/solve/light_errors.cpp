@@ -87,7 +87,10 @@ Table::Cell recorded(const TransferData& data, const std::string& path) {
 std::shared_ptr<const TransferData> truth_of(const TransferData& data, const std::string& path) {
   if (path.empty()) return {std::shared_ptr<const TransferData>(), &data};
   auto other = std::make_shared<const TransferData>(load_transfer_file(path));
-  if (other->patches.area != data.patches.area) throw Error(path + " has other patches");
+  if (other->patches.area != data.patches.area ||
+      other->patches.reflectance != data.patches.reflectance) {
+    throw Error(path + " has other patches or materials");
+  }
   return other;
 }
 

@@ -1,6 +1,7 @@
 #include "bench/support/input.h"
 
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "bench/support/program.h"
 #include "rebounce/error.h"
@@ -8,6 +9,10 @@
 
 namespace rebounce::bench {
 namespace {
+
+bool is_transfer_file(const std::filesystem::path& input) {
+  return input.extension() == ".safetensors";
+}
 
 TransferData load(const std::string& path, const InputOptions& options) {
   TransferData data = load_transfer_file(path);
@@ -17,18 +22,29 @@ TransferData load(const std::string& path, const InputOptions& options) {
   return data;
 }
 
+/// Chooses pairs or links by the number of patches alone, not by the memory that is left, so that
+/// it is known which of them are to be stored.
+void keep_form_factors(BuildSettings& settings) {
+  const bool may_be_links = settings.operator_kind == OperatorKind::kHierarchical &&
+                            settings.subdivision.patch_count > kPairsPatchCount;
+  ExchangeSource& source = settings.exchange_source;
+  if (source == ExchangeSource::kAutomatic) {
+    source = may_be_links ? ExchangeSource::kLinks : ExchangeSource::kPairs;
+  }
+  settings.store_form_factors = source == ExchangeSource::kPairs;
+  settings.store_links = source == ExchangeSource::kLinks;
+}
+
 TransferData build(const std::string& scene, std::size_t patch_count, const InputOptions& options) {
   BuildSettings settings = options.settings;
   settings.subdivision.patch_count = patch_count;
-  settings.store_form_factors =
-      settings.exchange_source == ExchangeSource::kPairs ||
-      (settings.exchange_source == ExchangeSource::kAutomatic && patch_count <= kPairsPatchCount);
+  if (options.with_form_factors || options.with_truth) keep_form_factors(settings);
   BuildReport report;
   TransferData data = build_transfer_data(scene, settings, report);
   if (options.with_truth && data.exchange.empty()) {
-    settings.exchange_source = ExchangeSource::kLinks;
-    settings.store_form_factors = false;
     settings.operator_kind = OperatorKind::kNoOperator;
+    settings.form_factors.link_epsilon =  // that of the links that were found to be near enough
+        nlohmann::json::parse(data.settings_json).at("link_epsilon");
     data.links = build_transfer_data(scene, settings, report).links;
   }
   return data;
@@ -69,13 +85,20 @@ CLI::Option* add_input_options(CLI::App& app, InputOptions& options) {
 void for_each_input(const InputOptions& options,
                     const std::function<void(std::shared_ptr<const TransferData>)>& work) {
   for (const std::string& input : options.inputs) {
-    if (std::filesystem::path(input).extension() == ".safetensors") {
+    if (is_transfer_file(input)) {
       work(std::make_shared<const TransferData>(load(input, options)));
       continue;
     }
+    if (options.patch_counts.empty()) throw Error(input + ": a scene needs --patches");
     for (const std::size_t patch_count : options.patch_counts) {
       work(std::make_shared<const TransferData>(build(input, patch_count, options)));
     }
+  }
+}
+
+void require_scenes(const InputOptions& options) {
+  for (const std::string& input : options.inputs) {
+    if (is_transfer_file(input)) throw Error(input + ": is a transfer file; give its scene");
   }
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -53,6 +54,17 @@ std::vector<Float3> light_of(const Light& lamp, const TransferData& data, Direct
 /// same lamps. Throws Error if there are none.
 std::vector<Light> lamps_in_the_open(const TransferData& data, const RayTracer& tracer, int count,
                                      std::uint64_t seed);
+
+/// Lamps of which the first ones change between two places, so that every frame finds them moved.
+struct MovingLamps {
+  std::vector<Light> lamps, elsewhere;  ///< `elsewhere`: one for each that moves
+
+  /// Those of the next frame.
+  std::span<const Light> next() {
+    std::ranges::swap_ranges(elsewhere, std::span(lamps).first(elsewhere.size()));
+    return lamps;
+  }
+};
 
 /// True if nothing stands between two places.
 bool free_way(const RayTracer& tracer, const Float3& from, const Float3& to);

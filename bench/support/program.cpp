@@ -20,7 +20,7 @@ constexpr int kBadInput = 1, kUsage = 2;
 std::string provenance(const std::string& benchmark, const CommonOptions& options) {
   const Machine machine = describe_machine();
   const std::string repeats =
-      options.repeats > 1 ? fmt::format("; medians of {}", options.repeats) : "";
+      options.repeats > 1 ? fmt::format("; {} repeats", options.repeats) : "";
   return fmt::format("{}, commit {}, {:%Y-%m-%d}\n{}, {} processors, {} threads; {}, {}{}\n",
                      benchmark, machine.commit, fmt::gmtime(std::time(nullptr)), machine.processor,
                      machine.processor_count, thread_count(options), machine.compiler,

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 
 namespace rebounce::bench {
 namespace {
@@ -16,6 +17,8 @@ std::string shown(const Table::Cell& cell) {
 
 std::string quoted(const Table::Cell& cell) {
   if (cell.is_null()) return "";
+  // JSON has no such numbers.
+  if (cell.is_number_float() && !std::isfinite(cell.get<double>())) return shown(cell);
   if (!cell.is_string()) return cell.dump();
   std::string text = cell.get<std::string>();
   if (text.find_first_of(",\"\r\n") == std::string::npos) return text;

@@ -244,11 +244,13 @@ void add_options(CLI::App& app, Options& options) {
                            "Quality of the form factors");
   app.add_option("--seed", patches.seed, "Of all that is random")->capture_default_str();
   bench::add_csv_option(app, options.common);
-  app.add_option("--patch-csv", options.patch_csv,
-                 "Table to write of the compared patches, for the last number of patches");
+  auto* patch_csv =
+      app.add_option("--patch-csv", options.patch_csv,
+                     "Table to write of the compared patches, for the last number of patches");
   app.add_flag("--causes", options.causes,
                "Compare all patches and add to their table what one bounce of the truth's light "
-               "brings them, along rays and by the form factors");
+               "brings them, along rays and by the form factors")
+      ->needs(patch_csv);
   app.add_flag("--receivers", options.receivers,
                "Add the errors that points would have with rows of their own, and with light of "
                "patches that varies on them");

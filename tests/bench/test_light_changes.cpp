@@ -23,6 +23,19 @@ TEST(LampOfType, ShinesTowardsItsTargetWithOneCandela) {
   EXPECT_EQ(spot.direction, place.direction) << "a target at its place has no direction";
 }
 
+TEST(MovingLamps, OnlyTheFirstChangeBetweenTwoPlaces) {
+  const auto at = [](float x) {
+    Light lamp;
+    lamp.position = {x, 0, 0};
+    return lamp;
+  };
+  MovingLamps moving{{at(1), at(2), at(3)}, {at(4), at(5)}};
+  for (const std::array<float, 3> places : {std::array{4.0F, 5.0F, 3.0F}, {1.0F, 2.0F, 3.0F}}) {
+    const std::span<const Light> lamps = moving.next();
+    for (std::size_t k = 0; k < places.size(); ++k) EXPECT_EQ(lamps[k].position[0], places[k]);
+  }
+}
+
 TEST(LightChanges, MuchOfTheLightArrivesAtOtherSurfacesUnderAnOpenSkyToo) {
   BuildSettings settings;
   settings.subdivision.patch_count = 300;
