@@ -37,8 +37,19 @@ def find_library(name):
     return re.search(rf"^\s*{re.escape(name)} .*=> (\S+)", lines, re.MULTILINE).group(1)
 
 
+def copy_copyright(library, folder):
+    """Copies what Debian's package of a library says of its licence, where there is such a package."""
+    if not shutil.which("dpkg-query"):
+        return
+    owner = subprocess.run(["dpkg-query", "-S", f"*/{library.name}"], stdout=subprocess.PIPE, text=True)
+    package = owner.stdout.partition(":")[0]
+    notice = pathlib.Path("/usr/share/doc", package, "copyright")
+    if notice.exists():
+        shutil.copyfile(notice, folder / f"{package}.copyright")
+
+
 def bundle(module):
-    """Puts what the module needs beside it, and lets each find the others there."""
+    """Puts what the module needs beside it, with licences, and lets each find the others there."""
     folder = module.parent / "lib"
     folder.mkdir(exist_ok=True)
     paths = needed(module)
@@ -48,7 +59,9 @@ def bundle(module):
     for name, path in paths.items():
         if OF_THE_SYSTEM.match(name):
             continue
-        shutil.copyfile(pathlib.Path(path).resolve(), folder / name)
+        library = pathlib.Path(path).resolve()
+        shutil.copyfile(library, folder / name)
+        copy_copyright(library, folder)
         subprocess.run(["patchelf", "--set-rpath", "$ORIGIN", folder / name], check=True)
     subprocess.run(["patchelf", "--set-rpath", "$ORIGIN/lib", module], check=True)
 
