@@ -96,8 +96,10 @@ class BuildByCMake(build_ext):
 
 
 def work_folder(name):
+    """An empty folder: what lies there, modules that are deleted since among it, would be packed."""
     folder = ROOT / "build" / "python-package" / name
-    folder.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
     return str(folder)
 
 
