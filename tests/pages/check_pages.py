@@ -41,6 +41,10 @@ NAME = re.compile(r"`(?:\w+(?:::|\.))*(\w*(?:\w_\w|[a-z][A-Z])\w*)(?:\(\))?`")
 PAGES_WITH_NAMES = ("notes/contributing/", "notes/concepts/")
 PAGES_ON_NAMING = ("notes/contributing/conventions.md",)
 
+SITE = "tests/pages/mkdocs.yml"
+# Folders whose pages site.py finds, and one that is not in the site.
+NOT_BY_NAME = ("notes/lab/", "notes/reference/cpp/", "notes/pictures/")
+
 TENSOR_NAMES = "transfer/file/transfer_file_format.h"
 TENSOR = re.compile(r'"((?:\w+\.)+\w+)"')
 
@@ -171,6 +175,15 @@ def tensors_are_explained(pages):
             yield f"{TENSOR_NAMES}: no page of the file format explains {name}"
 
 
+def navigation_names_pages(pages):
+    """The navigation of the site names every page but those of some folders, and no other."""
+    named = re.findall(r"\S+\.md$", (pages.root / SITE).read_text(encoding="utf-8"), re.MULTILINE)
+    named = {f"notes/{path}" for path in named}
+    there = {p for p in pages.text if p.startswith("notes/") and not p.startswith(NOT_BY_NAME)}
+    for path in sorted(named ^ there):
+        yield f"{SITE}: {path} is {'no page' if path in named else 'not in the navigation'}"
+
+
 RULES = (
     readme_is_short,
     figures_are_measured,
@@ -180,6 +193,7 @@ RULES = (
     sources_name_pages,
     names_are_in_the_code,
     tensors_are_explained,
+    navigation_names_pages,
 )
 
 

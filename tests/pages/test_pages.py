@@ -173,6 +173,17 @@ class Rules(unittest.TestCase):
             ["notes/contributing/a.md:2: no source has gone_name"],
         )
 
+    def test_pages_out_of_the_navigation(self):
+        files = {
+            check_pages.SITE: "nav:\n  - A: a.md\n  - B:\n      - b/README.md\n  - Lab: lab\n",
+            **dict.fromkeys(("notes/a.md", "notes/c.md", "notes/lab/d.md"), ""),
+        }
+        wanted = ["notes/b/README.md is no page", "notes/c.md is not in the navigation"]
+        self.assertEqual(
+            self.broken(check_pages.navigation_names_pages, files),
+            [f"{check_pages.SITE}: {line}" for line in wanted],
+        )
+
     def test_tensors_without_a_word(self):
         files = {check_pages.TENSOR_NAMES: '"mesh.a" "mesh.b"', "notes/reference/file_format.md": "`mesh.a`"}
         broken = self.broken(check_pages.tensors_are_explained, files)
