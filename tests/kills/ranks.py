@@ -119,6 +119,7 @@ def main():
     stages = [stage for stage in known.stages if stage[0] != kills.WRITING]
     if options.stages is not None:
         stages = draw.sample(stages, min(options.stages, len(stages)))
+    killed_of_all = 0
     for name, first, last in stages:
         killed = 0
         for _ in range(options.moments):
@@ -129,6 +130,10 @@ def main():
                 faults += 1
                 print(f"FAULT: {name}: {fault}")
         print(f"{name:<24} {killed} of {options.moments} killed before the end", flush=True)
+        killed_of_all += killed
+    if killed_of_all == 0:
+        faults += 1
+        print("FAULT: no rank was killed before its end")
     shutil.rmtree(work, ignore_errors=True)
     return 1 if faults else 0
 
