@@ -11,9 +11,9 @@ a commit whose results are there is neither built nor run again. They hold for o
 the libraries: give a machine a work folder of its own.
 
 Instruction sets are chosen at run time, and the product has no way to force one. The program that
-runs is therefore linked from the objects of the commit and one that is compiled anew: the source
-that says how wide the kernels may be, changed in a copy so that $REBOUNCE_TEST_INSTRUCTION_SET is
-the most that it answers. All else is as the release preset builds it.
+runs is therefore linked from the objects of the commit and some that are compiled anew: the sources
+that say how wide kernels may be, changed in copies so that $REBOUNCE_TEST_INSTRUCTION_SET is the most
+that they answer. All else is as the release preset builds it.
 
 A row is `equal`; or `tensors equal`, where only the metadata or, of arrays, the container differ;
 or `differ`, with the names of what does. Exit status 1: some row is not equal, or what a commit
@@ -43,7 +43,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 REPOSITORY = HERE.parents[1]
 SCENES = HERE.parent / "scenes"
 
-# The function that says how wide the kernels may be, as it was and as it is, and what limits it.
+# The functions that say how wide kernels may be, as they were and as they are, and what limits them.
 LIMITS = {
     "InstructionSet widest_instruction_set() {": """static InstructionSet widest_of_processor();
 InstructionSet widest_instruction_set() {
@@ -141,20 +141,23 @@ def build(tree):
         subprocess.run(command, cwd=tree, check=True, stdout=sys.stderr)
 
 
-def entry_of_dispatcher(folder):
-    """The compile command of the source that chooses the instruction set."""
+def entries_of_dispatchers(folder):
+    """The compile commands of the sources that choose instruction sets."""
+    found = []
     for entry in json.loads((folder / "compile_commands.json").read_text()):
         source = pathlib.Path(entry["file"])
         text = source.read_text(errors="replace") if source.is_file() else ""
         if any(signature in text for signature in LIMITS):
-            return entry
-    raise SystemExit(f"no source of {folder} says how wide the kernels may be: {list(LIMITS)}")
+            found.append(entry)
+    if not found:
+        raise SystemExit(f"no source of {folder} says how wide kernels may be: {list(LIMITS)}")
+    return found
 
 
 def compile_limited(entry, work):
-    """Compiles the dispatcher with a limit; what it replaces, and the new object."""
+    """Compiles a dispatcher with a limit; what it replaces, and the new object."""
     source = pathlib.Path(entry["file"])
-    changed, limited = work / "limited.cpp", work / "limited.o"
+    changed, limited = work / f"limited_{source.name}", work / f"limited_{source.stem}.o"
     text = source.read_text()
     for signature, limit in LIMITS.items():
         text = text.replace(signature, limit)
@@ -169,12 +172,12 @@ def compile_limited(entry, work):
 
 
 def link(folder, work, program):
-    """Links the program of a build with the limited dispatcher in front of the libraries."""
-    original, limited = compile_limited(entry_of_dispatcher(folder), work)
+    """Links the program of a build with the limited dispatchers in front of the libraries."""
+    limited = dict(compile_limited(entry, work) for entry in entries_of_dispatchers(folder))
     last = output_of("ninja", "-C", folder, "-t", "commands", "rebounce").splitlines()[-1]
-    words = [word for word in shlex.split(last) if word not in (":", "&&", original)]
+    words = [word for word in shlex.split(last) if word not in (":", "&&", *limited)]
     at = words.index("-o") + 1
-    words[at : at + 1] = [str(program), str(limited)]
+    words[at : at + 1] = [str(program), *map(str, limited.values())]
     subprocess.run(words, cwd=folder, check=True)
 
 
