@@ -1,5 +1,7 @@
 #include "precompute/facets/exchange_factors.h"
 
+#include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "precompute/inverse/dense_transfer.h"
@@ -10,6 +12,45 @@ namespace {
 
 // The inverse is that of patches, whose reflectance is at most 0.99.
 constexpr double kLeastEmissivity = 0.01;
+
+// Factors of other programs come in few digits: six after the point, or four that count.
+constexpr double kFactorRounding = 1e-6, kRelativeRounding = 1e-3;
+
+/// F(i, j); 0 if it is not stored.
+double factor_of(const ViewFactors& factors, std::size_t i, std::uint32_t j) {
+  const auto begin = factors.column.begin() + static_cast<std::ptrdiff_t>(factors.row_begin[i]);
+  const auto end = factors.column.begin() + static_cast<std::ptrdiff_t>(factors.row_begin[i + 1]);
+  const auto found = std::lower_bound(begin, end, j);
+  if (found == end || *found != j) return 0;
+  return factors.factor[static_cast<std::size_t>(found - factors.column.begin())];
+}
+
+[[noreturn]] void refuse_factor(std::size_t i, std::size_t j, const std::string& why) {
+  throw Error("the view factor from facet " + std::to_string(i + 1) + " to facet " +
+              std::to_string(j + 1) + " " + why);
+}
+
+/// Throws Error unless areas are above 0, factors at least 0, and the two factors of a pair say the
+/// same: only one of them is used.
+void check_factors(const ViewFactors& factors) {
+  const std::vector<double>& area = factors.area;
+  for (std::size_t i = 0; i < factors.size(); ++i) {
+    if (!(area[i] > 0) || !std::isfinite(area[i])) {
+      throw Error("the area of facet " + std::to_string(i + 1) + " is not a number above 0");
+    }
+  }
+  for (std::uint32_t i = 0; i < factors.size(); ++i) {
+    for (std::uint64_t k = factors.row_begin[i]; k < factors.row_begin[i + 1]; ++k) {
+      const std::uint32_t j = factors.column[k];
+      const double there = area[i] * factors.factor[k], back = area[j] * factor_of(factors, j, i);
+      if (!(there >= 0) || !std::isfinite(there)) refuse_factor(i, j, "is not a number from 0 on");
+      if (std::abs(there - back) > kRelativeRounding * std::max(there, back) +
+                                       kFactorRounding * std::max(area[i], area[j])) {
+        refuse_factor(i, j, "and the one back differ: times area they must be the same");
+      }
+    }
+  }
+}
 
 ExchangeMatrix exchange_of(const ViewFactors& factors) {
   std::vector<std::uint64_t> row_begin = {0};
@@ -51,6 +92,7 @@ ExchangeFactors compute_exchange_factors(const ViewFactors& factors,
     if (emissivity[i] >= kLeastEmissivity && emissivity[i] <= 1) continue;
     throw Error("the emissivity of facet " + std::to_string(i + 1) + " is not in [0.01, 1]");
   }
+  check_factors(factors);
   const auto transfer = build_dense_transfer(exchange_of(factors), patches_of(factors, emissivity),
                                              Precision::kF32, progress);
   ExchangeFactors result{std::vector<float>(n * n), factors.sky};

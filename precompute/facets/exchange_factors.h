@@ -18,8 +18,9 @@ struct ExchangeFactors {
   std::vector<double> sky;    ///< [n] fraction that leaves in the end
 };
 
-/// `emissivity` [n] in [0.01, 1]. Throws Error if its size is wrong or a number is out of range;
-/// Cancelled if asked to stop. Time grows with n³, memory with n².
+/// `emissivity` [n] in [0.01, 1]. Throws Error if its size is wrong, a number is out of range, or
+/// area(i) F(i, j) = area(j) F(j, i) does not hold to four digits; Cancelled if asked to stop. Time
+/// grows with n³, memory with n².
 ExchangeFactors compute_exchange_factors(const ViewFactors& factors,
                                          std::span<const double> emissivity,
                                          const Progress& progress = {});

@@ -142,10 +142,11 @@ def exchange_factors(
     emissivity: in [0.01, 1], a number or [m].
     Returns G [m, m]: the fraction of what i emits that j absorbs after all reflections, and [m] the
     fraction that leaves in the end. Memory grows with m², time with m³. Raises ValueError if a shape
-    does not fit, Error if a number is out of range.
+    does not fit, Error if a number is out of range, or area[i] F[i, j] = area[j] F[j, i] does not
+    hold to four digits.
     """
-    matrix = scipy.sparse.csr_matrix(F)
-    matrix.sort_indices()
+    matrix = scipy.sparse.csr_matrix(F, dtype=np.float64, copy=True)
+    matrix.sum_duplicates()
     count = matrix.shape[0]
     if matrix.shape != (count, count):
         raise ValueError(f"F has the shape {list(matrix.shape)}, and needs [{count}, {count}]")
@@ -159,7 +160,7 @@ def exchange_factors(
         factors, lost = _core.exchange_factors(
             matrix.indptr.astype(np.int64),
             matrix.indices.astype(np.uint32),
-            np.ascontiguousarray(matrix.data, dtype=np.float64),
+            matrix.data,
             arrays[1],
             arrays[0],
             arrays[2],

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
+#include <string>
 
 #include "precompute/facets/exchange_factors.h"
 #include "tests/precompute/facets/city_facets.h"
@@ -257,6 +259,30 @@ TEST(ExchangeFactors, OfAGreyBoxSatisfyTheirEquation) {
                      "5 emissivities for 6 facets");
   test::expect_error([&] { compute_exchange_factors(f, std::vector<double>(6, 0.0)); },
                      "facet 1 is not in [0.01, 1]");
+}
+
+TEST(ExchangeFactors, RefuseViewFactorsThatCannotBe) {
+  const ViewFactors right = compute_view_factors(facets_of(box({0, 0, 0}, {1, 2, 3}, true)),
+                                                 {.quality = FormFactorQuality::kLow});
+  const auto expect_refused = [&](const auto& change, const std::string& why) {
+    ViewFactors wrong = right;
+    change(wrong);
+    test::expect_error([&] { compute_exchange_factors(wrong, std::vector<double>(6, 0.5)); }, why);
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const double area : {0.0, -1.0, nan}) {
+    expect_refused([=](ViewFactors& f) { f.area[1] = area; }, "the area of facet 2 is not");
+  }
+  for (const double factor : {-0.1, nan}) {
+    expect_refused([=](ViewFactors& f) { f.factor[0] = factor; },
+                   "the view factor from facet 1 to facet 2 is not a number from 0 on");
+  }
+  // The last row is in the lower triangle alone.
+  expect_refused([](ViewFactors& f) { f.factor.back() *= 1.01; },
+                 "the view factor from facet 5 to facet 6 and the one back differ");
+  ViewFactors single = right;
+  for (double& factor : single.factor) factor = static_cast<float>(factor);
+  EXPECT_NO_THROW(compute_exchange_factors(single, std::vector<double>(6, 0.5)));
 }
 
 }  // namespace

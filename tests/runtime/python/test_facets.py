@@ -43,6 +43,33 @@ def test_a_box_is_closed_and_its_exchange_factors_add_up():
     assert np.allclose(G, right, atol=1e-5)
 
 
+def test_view_factors_that_cannot_be_are_refused():
+    F = np.array([[0, 0.5], [0.25, 0]])
+    area, half = np.array([1.0, 2.0]), np.array([0.5, 0.75])
+
+    def exchange(F, area=area):
+        return rebounce.exchange_factors(F, half, area, 0.5)[0]
+
+    assert np.array_equal(exchange(F.astype(np.float32)), exchange(F))
+    for broken in (F * [[1, 1.1], [1, 1]], F * [[1, 1], [0, 1]]):
+        with pytest.raises(rebounce.Error, match="from facet [12] to facet [12] and the one back"):
+            exchange(broken)
+    for factor in (-0.5, np.nan, np.inf):
+        with pytest.raises(rebounce.Error, match="is not a number from 0 on"):
+            exchange(np.where(F > 0, factor, 0))
+    with pytest.raises(rebounce.Error, match="the area of facet 2 is not a number above 0"):
+        exchange(F, np.array([1.0, 0.0]))
+
+
+def test_exchange_factors_leave_the_matrix_as_it_is():
+    """Its columns are in no order, and one entry is in two parts."""
+    given = [0.2, 0.25, 0.25, 0.5, 0.2], [2, 1, 1, 0, 0], [0, 3, 4, 5]
+    F = scipy.sparse.csr_matrix(given, shape=(3, 3))
+    found = rebounce.exchange_factors(F, 0.3, 1.0, 0.5)[0]
+    assert [list(part) for part in (F.data, F.indices, F.indptr)] == list(given)
+    assert np.array_equal(found, rebounce.exchange_factors(F.toarray(), 0.3, 1.0, 0.5)[0])
+
+
 def test_obstructions_have_no_row():
     square = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
     at = [[(x, y, z) for x, y, _ in square] for z in (0, 0.5, 1)]
