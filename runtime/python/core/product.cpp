@@ -277,6 +277,7 @@ py::array apply_to_array(const Data& data, const py::array& light, bool adjoint,
   if (py::isinstance<py::array_t<float>>(light)) {
     return apply_to<float>(data, light, adjoint, channel);
   }
+  if (light.dtype().kind() == 'c') throw py::value_error("light must be real, not complex");
   const auto doubles = py::array_t<double>::ensure(light);
   if (!doubles) throw py::value_error("light must be an array of numbers");
   return apply_to<double>(data, doubles, adjoint, channel);

@@ -113,6 +113,8 @@ class FormFactorOperator(LinearOperator):  # type: ignore[misc]
         super().__init__(np.dtype(dtype), (data.patch_count, data.patch_count))
 
     def _apply(self, x: Array, adjoint: bool) -> Array:
+        if np.iscomplexobj(x):
+            raise ValueError("light must be real, not complex")
         dtype = np.float32 if x.dtype == np.float32 else np.float64
         return self._core.gather(_block(x, self.shape[0], dtype), adjoint)
 

@@ -178,6 +178,9 @@ def test_products_of_every_layout(cornell):
     for wrong in (np.ones(n), np.ones((n, 2)), np.ones((1, 3 * n)), np.array(["light"] * 3 * n)):
         with pytest.raises(ValueError):
             whole @ wrong
+    for op in (whole, whole.H, whole.channel(0), cornell.form_factors, cornell.form_factors.H):
+        with pytest.raises(ValueError, match="light must be real, not complex"):
+            op @ np.full(op.shape[1], 1 + 1j)
 
 
 def test_operators_work_in_solvers(small_room):
