@@ -144,7 +144,7 @@ void add_data(py::module_& module) {
       .def("exchange", &exchange_of_pairs)
       .def("apply", &apply_to_array, py::arg("light"), py::arg("adjoint"), py::arg("channel"));
   py::class_<FormFactors>(module, "FormFactors")
-      .def(py::init<const Data&>())
+      .def(py::init<const Data&>(), py::call_guard<py::gil_scoped_release>())
       .def("gather", &gather_with<float>, py::arg("light").noconvert(), py::arg("adjoint"))
       .def("gather", &gather_with<double>, py::arg("light"), py::arg("adjoint"));
   module.def("load", [](const std::filesystem::path& path) {

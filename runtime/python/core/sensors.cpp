@@ -13,11 +13,16 @@
 namespace rebounce::python {
 namespace {
 
+RayTracer tracer_of(const Data& data) {
+  const py::gil_scoped_release unlocked;
+  return make_surface_tracer(data->mesh);
+}
+
 /// The places of light meters in a scene, and rays through it.
 class Sensors {
  public:
   Sensors(const Data& data, const Array<float>& positions, const Array<float>& normals)
-      : data_(data.transfer), tracer_(make_surface_tracer(data->mesh)) {
+      : data_(data.transfer), tracer_(tracer_of(data)) {
     check_shape(positions, {-1, 3}, "positions");
     check_shape(normals, {positions.shape(0), 3}, "normals");
     const auto points = rows_of(positions), directions = rows_of(normals);

@@ -2,7 +2,7 @@
 
 Arrays are NumPy's, matrices SciPy's. Units are photometric, as in glTF: metres, candela, lux, candela
 per square metre; up is +y. Three channels, linear Rec.709 red, green and blue; they may stand for any
-three bands. Long work shows its progress, stops on Ctrl-C and runs without Python's lock.
+three bands. Long work runs without Python's lock; what takes `progress` shows it, and stops on Ctrl-C.
 
 >>> import rebounce
 >>> scene = rebounce.load_scene("room.glb")                     # doctest: +SKIP

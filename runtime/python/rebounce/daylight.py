@@ -311,6 +311,8 @@ def simulate_year(
     )
     hours = np.flatnonzero(cells[:, 1:].any(axis=1))
     engine = Engine(data, points_per_patch=points_per_patch)
+    engine.relight(lamps)
+    of_lamps = sensors.illuminance(engine, lamps) @ _LUMINOUS
     for material in range(len(data.record["materials"])):
         engine.set_emission_scale(material, 0.0)
     result = np.empty((len(sensors), len(hours)), np.float32)
@@ -329,10 +331,6 @@ def simulate_year(
             result[:, begin : begin + len(part)] = (
                 sensors.patches @ radiosity + np.pi * (sensors.sky_cells @ cells[part].T) + arriving
             )
-    for material in range(len(data.record["materials"])):
-        engine.set_emission_scale(material, 1.0)
-    engine.relight(lamps)
-    of_lamps = sensors.illuminance(engine, lamps) @ _LUMINOUS
     return Year(result, hours, of_lamps.astype(np.float32))
 
 

@@ -113,6 +113,12 @@ def test_a_year_in_the_open(tmp_path):
         np.where(abs(hours - 12) < 6, 600.0, 0), np.where(abs(hours - 12) < 7, 120.0, 0),
     )  # fmt: skip
     lamp = rebounce.Light(position=(0, 2.5, 0), intensity=400)
+    reports, bad = [], rebounce.Light(intensity=float("nan"))
+    with pytest.raises(rebounce.Error, match="light 0"):
+        daylight.simulate_year(
+            data, sensors, weather, [bad], progress=lambda *report: reports.append(report)
+        )
+    assert not reports
     year = daylight.simulate_year(data, sensors, weather, [lamp], progress=False)
     assert 12 <= len(year.hours) <= 14
     to_sun = daylight.sun_position(weather)[year.hours]
