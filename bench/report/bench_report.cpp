@@ -112,8 +112,9 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--solve-threads", options.solve_threads, "Threads while relighting is timed")
       ->check(CLI::Range(1, 4096))
       ->capture_default_str();
-  app.add_option("--repeats", options.common.repeats,
-                 "Timings of each thing; 0: 7, 5 from 3,000 patches, 3 from 10,000 and with --quick")
+  app.add_option(
+         "--repeats", options.common.repeats,
+         "Timings of each thing; 0: 7, 5 from 3,000 patches, 3 from 10,000 and with --quick")
       ->check(CLI::Range(0, 100000))
       ->capture_default_str();
   add_threads_option(app, options.common)

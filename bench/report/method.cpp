@@ -99,8 +99,7 @@ Reads reads_of(SolveMethod method, const FormFactorOperator& form_factors) {
   const auto relaxation = dynamic_cast<const SweepableFormFactors&>(form_factors).make_relaxation();
   const auto forward = static_cast<std::size_t>(relaxation->reads_per_sweep(SweepOrder::kForward));
   if (method == SolveMethod::kGaussSeidel) return {.sweep = forward};
-  const auto both =
-      static_cast<std::size_t>(relaxation->reads_per_sweep(SweepOrder::kSymmetric));
+  const auto both = static_cast<std::size_t>(relaxation->reads_per_sweep(SweepOrder::kSymmetric));
   // The first sweep finds what later ones keep from the sweep before.
   return {.sweep = both, .cold_start = forward - both, .warm_start = forward - both};
 }

@@ -1,5 +1,11 @@
 #include "transfer/base/parallel.h"
 
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+
+#include <algorithm>
+
 namespace rebounce {
 namespace {
 
@@ -8,6 +14,11 @@ void run_here(const ParallelLoop& loop) {
 }
 
 #ifdef _OPENMP
+/// Whether a parallel region that begins here has more than one thread.
+bool has_threads() {
+  return omp_get_max_threads() > 1 && omp_get_active_level() < omp_get_max_active_levels();
+}
+
 /// Runs all loops in one parallel region: the threads start once and meet after each loop.
 void run_with_openmp(std::initializer_list<ParallelLoop> loops) {
 #pragma omp parallel
@@ -24,7 +35,7 @@ void run_with_openmp(std::initializer_list<ParallelLoop> loops) {
 void run_in_turn(const Scheduler& scheduler, std::initializer_list<ParallelLoop> loops) {
 #ifdef _OPENMP
   const auto is_shared = [](const ParallelLoop& loop) { return loop.count > 1; };
-  if (scheduler.parallel_for == nullptr && std::ranges::any_of(loops, is_shared)) {
+  if (scheduler.parallel_for == nullptr && has_threads() && std::ranges::any_of(loops, is_shared)) {
     run_with_openmp(loops);
     return;
   }

@@ -199,12 +199,13 @@ REBOUNCE_INLINE inline bool copy_input(const float* in, const CouplingEnd& end, 
   V any = V::zero();
   for (std::size_t k = 0; k < end.count; k += V::kWidth) {
     V coefficients = V::load_some(from + k, std::min(end.count - k, V::kWidth));
+    any = any_of(any, coefficients);
     if (k < end.residual_count) {
       const V residual =
           V::load_some(from + end.count + k, std::min(end.residual_count - k, V::kWidth));
+      any = any_of(any, residual);
       coefficients = multiply_add(residual, scale, coefficients);
     }
-    any = any_of(any, coefficients);
     coefficients.store(to + k);
   }
   return any.any_coefficient();
@@ -254,6 +255,8 @@ void multiply_lit(const Rows& rows, const CouplingBlock& coupling, const float* 
   const bool light_to_rows = to_rows && copy_input<V>(in, column, scratch);
   const bool light_to_columns =
       to_columns && copy_input<V>(in, row, scratch + end_size(coupling.columns));
+  // Where both ends are dark, what they have already is what the products give.
+  if (!light_to_rows && !light_to_columns && to_rows && to_columns && in == out) return;
   if (light_to_rows && light_to_columns) {
     multiply_coupling<V, Direction::kBoth>(rows, coupling, inputs, out);
   } else if (light_to_rows) {

@@ -12,87 +12,17 @@
 #include "transfer/kernels/block_kernels.h"
 #include "transfer/kernels/kernels_of_storage.h"
 #include "transfer/operator/hierarchical_plan.h"
+#include "transfer/operator/light_of_patches.h"
+#include "transfer/operator/work_vectors.h"
 
 namespace rebounce {
 namespace {
-
-// The vectors in the workspace begin at multiples of this many floats, a cache line.
-constexpr std::size_t kLine = 16;
 
 // Positions that one task gathers.
 constexpr std::size_t kPositionsPerTask = 1024;
 
 // Ends of dense blocks, and cluster bases, that one task handles.
 constexpr std::size_t kDenseEndsPerTask = 64, kClusterBasesPerTask = 32;
-
-// The light of a patch is prefetched this many positions ahead, to the second-level cache: it can
-// have more loads in flight than the first-level cache (lab/051).
-constexpr std::size_t kPatchesAhead = 64;
-constexpr int kToRead = 0, kToWrite = 1, kSecondLevel = 2;
-
-std::size_t round_up(std::size_t size, std::size_t multiple) {
-  return (size + multiple - 1) / multiple * multiple;
-}
-
-/// The vectors of an apply to some lights. The positions of patches come first, then cluster
-/// coefficients. Coupling matrices and dense blocks write their products over their input, which
-/// saves memory traffic.
-struct WorkVectors {
-  std::size_t light_count;
-  PlanarVectors<float> x;           ///< [positions] exitance times the root of the area
-  Coefficients<float> coefficient;  ///< of x in the bases, later of y
-  PlanarVectors<float> scratch;     ///< input copies of the coupling matrices, for each part
-  PlanarVectors<float> y;           ///< [positions] what arrives
-  LightRun* runs;                   ///< [lights][run_count] measures of x
-
-  WorkVectors(std::size_t positions, const HierarchicalLayout& layout, std::size_t lights,
-              float* buffer)
-      : light_count(lights) {
-    const std::size_t vector = vector_size(positions, layout);
-    const std::size_t coefficients = coefficients_size(layout);
-    const auto take = [&](std::size_t size) { return std::exchange(buffer, buffer + size); };
-    x = {take(kChannelCount * light_count * vector), vector, kChannelCount * light_count};
-    coefficient = {take(light_count * coefficients), coefficients};
-    scratch = {take(kParts * layout.largest_scratch), layout.largest_scratch, kParts};
-    y = {take(kChannelCount * light_count * vector), vector, kChannelCount * light_count};
-    runs = reinterpret_cast<LightRun*>(take(light_count * runs_size(vector)));
-  }
-
-  /// The measures of a light from a position on.
-  LightRun* runs_at(std::size_t light, std::size_t position) const {
-    return runs + (light * x.stride + position) / LightRun::kPositions;
-  }
-
-  static std::size_t size(std::size_t positions, const HierarchicalLayout& layout,
-                          std::size_t light_count) {
-    const std::size_t vector = vector_size(positions, layout);
-    return (2 * kChannelCount * vector + coefficients_size(layout) + runs_size(vector)) *
-               light_count +
-           kParts * layout.largest_scratch;
-  }
-
- private:
-  static constexpr std::size_t kParts = HierarchicalPlan::kMostParts;
-
-  static std::size_t vector_size(std::size_t positions, const HierarchicalLayout& layout) {
-    return round_up(positions + layout.cluster_coefficient_count, kLine);
-  }
-  /// In floats, for a vector of this size.
-  static std::size_t runs_size(std::size_t vector) {
-    return vector / LightRun::kPositions * (sizeof(LightRun) / sizeof(float));
-  }
-  static std::size_t coefficients_size(const HierarchicalLayout& layout) {
-    return round_up(layout.coefficient_count * kChannelLanes, kLine);
-  }
-};
-
-PlanarVectors<const float> constant(const PlanarVectors<float>& vectors) {
-  return {vectors.data, vectors.stride, vectors.count};
-}
-
-Coefficients<const float> constant(const Coefficients<float>& coefficients) {
-  return {coefficients.data, coefficients.stride};
-}
 
 /// Entries [first, last) of `all`.
 template <typename T>
@@ -226,97 +156,6 @@ class Phases {
   const WorkVectors& work_;
 };
 
-void clear(const PlanarVectors<float>& vectors, std::size_t begin, std::size_t end) {
-  for (std::size_t v = 0; v < vectors.count; ++v) {
-    float* const data = vectors.data + v * vectors.stride;
-    std::fill(data + begin, data + end, 0.0F);
-  }
-}
-
-/// Light of patches in planes of one channel each, [count][n]. Each light of an apply takes three
-/// of them; those that the last one lacks are dark.
-template <typename T>
-struct Planes {
-  T* data;
-  std::size_t count;
-};
-
-/// Copies the light of the patches to x, and what arrives from y to the patches.
-struct Exchange {
-  std::span<const std::uint32_t> patch;                ///< [n] patch at each position
-  std::span<const float> gather_scale, scatter_scale;  ///< [n] by position
-  const WorkVectors& work;
-
-  void gather(std::span<const Float3> light, std::size_t begin, std::size_t end) const {
-    const std::size_t n = patch.size(), stride = work.x.stride, last = std::min(end, n);
-    for (std::size_t v = 0; v < work.x.count; v += kChannelCount) {
-      const Float3* const from_light = light.data() + v / kChannelCount * n;
-      float* const x = work.x.data + v * stride;
-      for (std::size_t k = begin; k < last; ++k) {
-        if (k + kPatchesAhead < n) {
-          __builtin_prefetch(&from_light[patch[k + kPatchesAhead]], kToRead, kSecondLevel);
-        }
-        const Float3& m = from_light[patch[k]];
-        const float weight = gather_scale[k];
-        for (int c = 0; c < kChannelCount; ++c) x[c * stride + k] = weight * m[c];
-      }
-    }
-    clear(work.x, std::max(begin, last), end);
-  }
-
-  void gather(const Planes<const float>& light, std::size_t begin, std::size_t end) const {
-    const std::size_t n = patch.size(), last = std::min(end, n);
-    for (std::size_t v = 0; v < work.x.count; ++v) {
-      float* const x = work.x.data + v * work.x.stride;
-      if (v >= light.count) {
-        std::fill(x + begin, x + last, 0.0F);
-        continue;
-      }
-      const float* const plane = light.data + v * n;
-      for (std::size_t k = begin; k < last; ++k) x[k] = gather_scale[k] * plane[patch[k]];
-    }
-    clear(work.x, std::max(begin, last), end);
-  }
-
-  /// Writes the light at the positions `targets`.
-  void scatter(std::span<const std::uint32_t> targets, std::span<Float3> light) const {
-    const std::size_t n = patch.size(), stride = work.y.stride;
-    for (std::size_t v = 0; v < work.y.count; v += kChannelCount) {
-      Float3* const to_light = light.data() + v / kChannelCount * n;
-      const float* const y = work.y.data + v * stride;
-      for (const std::uint32_t k : targets) {
-        if (k + kPatchesAhead < n) {
-          __builtin_prefetch(&to_light[patch[k + kPatchesAhead]], kToWrite, kSecondLevel);
-        }
-        Float3& h = to_light[patch[k]];
-        const float weight = scatter_scale[k];
-        for (int c = 0; c < kChannelCount; ++c) h[c] = weight * y[c * stride + k];
-      }
-    }
-  }
-
-  void scatter(std::span<const std::uint32_t> targets, const Planes<float>& light) const {
-    for (std::size_t v = 0; v < light.count; ++v) {
-      float* const plane = light.data + v * patch.size();
-      const float* const y = work.y.data + v * work.y.stride;
-      for (const std::uint32_t k : targets) plane[patch[k]] = scatter_scale[k] * y[k];
-    }
-  }
-
-  /// Nothing arrives at the patches `dark`.
-  void darken(std::span<const std::uint32_t> dark, std::span<Float3> light) const {
-    for (std::size_t l = 0; l < work.light_count; ++l) {
-      for (const std::uint32_t p : dark) light[l * patch.size() + p] = {0, 0, 0};
-    }
-  }
-
-  void darken(std::span<const std::uint32_t> dark, const Planes<float>& light) const {
-    for (std::size_t v = 0; v < light.count; ++v) {
-      for (const std::uint32_t p : dark) light.data[v * patch.size() + p] = 0;
-    }
-  }
-};
-
 /// Computes all that arrives at a range of positions or cluster coefficients.
 void arrive(const HierarchicalPlan& plan, const HierarchicalPlan::Arrival& arrival,
             const Phases& phases, const WorkVectors& work) {
@@ -332,17 +171,17 @@ std::span<const Entry> of_part(const std::vector<Entry>& entries,
   return between(entries, parts[part], parts[part + 1]);
 }
 
-/// `From` and `To`: the light of patches as Exchange takes it.
+/// `From` and `To`: the light of patches as LightOfPatches takes it.
 template <typename From, typename To>
-void run_plan(const HierarchicalPlan& plan, const Phases& phases, const Exchange& exchange,
+void run_plan(const HierarchicalPlan& plan, const Phases& phases, const LightOfPatches& patches,
               const WorkVectors& work, const From& initial_exitance, const To& indirect_irradiance,
               const Scheduler& scheduler) {
-  exchange.darken(plan.dark, indirect_irradiance);
-  const std::size_t positions = HierarchicalFormat::position_count(exchange.patch.size());
+  patches.darken(plan.dark, indirect_irradiance);
+  const std::size_t positions = HierarchicalFormat::position_count(patches.patch.size());
   const auto gather = [&](std::size_t k) {
     const std::size_t begin = k * kPositionsPerTask;
     const std::size_t end = std::min(begin + kPositionsPerTask, positions);
-    exchange.gather(initial_exitance, begin, end);
+    patches.gather(initial_exitance, begin, end);
     phases.measure(begin, end);
   };
   // Dense blocks of several matrices get their input in the same loop as the projections.
@@ -384,8 +223,8 @@ void run_plan(const HierarchicalPlan& plan, const Phases& phases, const Exchange
   const auto arrive_at_patches = [&](std::size_t k) {
     const HierarchicalPlan::Arrival& arrival = plan.arrivals[plan.arrivals.size() - 1 - k];
     arrive(plan, arrival, phases, work);
-    exchange.scatter(between(plan.targets, arrival.first_target, arrival.last_target),
-                     indirect_irradiance);
+    patches.scatter(between(plan.targets, arrival.first_target, arrival.last_target),
+                    indirect_irradiance);
   };
   run_in_turn(
       scheduler,
@@ -473,7 +312,7 @@ ChannelLanes HierarchicalOperator::all_lanes() const {
 std::size_t HierarchicalOperator::batch_workspace_size(std::size_t light_count) const {
   return WorkVectors::size(HierarchicalFormat::position_count(patch_count()), *layout_,
                            light_count) +
-         kLine;
+         WorkVectors::kLine;
 }
 
 template <typename From, typename To>
@@ -484,14 +323,15 @@ void HierarchicalOperator::run(const HierarchicalPlan& plan, std::size_t light_c
   // The workspace has room for one cache line more than its vectors, so that they can begin with
   // one.
   const std::size_t misplaced = reinterpret_cast<std::uintptr_t>(workspace.data()) / sizeof(float);
-  float* const aligned = workspace.data() + (kLine - misplaced % kLine) % kLine;
+  float* const aligned =
+      workspace.data() + (WorkVectors::kLine - misplaced % WorkVectors::kLine) % WorkVectors::kLine;
   const WorkVectors work(HierarchicalFormat::position_count(patch_count()), *layout_, light_count,
                          aligned);
-  const Exchange exchange{storage_->patch, gather_scale_, scatter_scale_, work};
+  const LightOfPatches patches{storage_->patch, gather_scale_, scatter_scale_, work};
   const BasisProducts bases(*storage_);
   const CouplingProducts couplings(*storage_, layout_->basis_value_count);
   const Phases phases(bases, couplings, lanes, storage_->coefficient_scale, work);
-  run_plan(plan, phases, exchange, work, initial_exitance, indirect_irradiance, scheduler);
+  run_plan(plan, phases, patches, work, initial_exitance, indirect_irradiance, scheduler);
 }
 
 void HierarchicalOperator::do_apply(std::span<const Float3> initial_exitance,
