@@ -101,7 +101,7 @@ class AccuracyBench {
 
   void begin(const Contestant& contestant, std::size_t k, Method& method) const {
     method.set_reflectance(cases_[k].reflectance);
-    if (cases_[k].cold()) {
+    if (cases_[k].cold) {
       method.reset();
     } else if (method.iterates()) {
       // Every change of a lamp begins where its first one, from zero, ends.
@@ -147,7 +147,7 @@ class AccuracyBench {
     AccuracyRow result{.contestant = contestant,
                        .change = cases_[first].change,
                        .sweeps = sweeps,
-                       .cold = method.iterates() && cases_[first].cold()};
+                       .cold = method.iterates() && cases_[first].cold};
     for (std::size_t k = first; k < first + settings_.lamp_count; ++k) {
       run(contestant, k, sweeps, method, cuts[k - first]);
       const auto error = [&](const std::vector<Float3>& truth) {

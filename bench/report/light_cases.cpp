@@ -35,7 +35,7 @@ std::vector<bool> repainted_patches(const TransferData& data) {
 
 /// The light of a cold start, with surfaces repainted.
 LightCase repaint(const LightCase& lit, const std::vector<bool>& painted) {
-  LightCase result{kRepainted, lit.after, lit.after, lit.reflectance, {}};
+  LightCase result{kRepainted, false, lit.after, lit.reflectance, {}};
   for (std::size_t i = 0; i < painted.size(); ++i) {
     for (int c = 0; c < kChannelCount && painted[i]; ++c) {
       result.after[i][c] *= kRepaint;
@@ -71,9 +71,10 @@ std::vector<LightCase> make_light_cases(const Contenders& contenders,
     const auto changes = light_changes(data, settings.motions, settings.seed + lamp,
                                        kLampTypes[lamp % kLampTypes.size()]);
     for (const LightChange& change : changes) {
-      cases.push_back({change.name, change.before, change.after, data.patches.reflectance, {}});
+      const bool cold = change.before.empty();
+      cases.push_back({change.name, cold, change.after, data.patches.reflectance, {}});
     }
-    cases.push_back({kSwitched, {}, changes.back().after, data.patches.reflectance, {}});
+    cases.push_back({kSwitched, true, changes.back().after, data.patches.reflectance, {}});
     cases.push_back(repaint(cases[cases.size() - changes.size() - 1], painted));
   }
   // Stable: changes in the order of the first lamp.

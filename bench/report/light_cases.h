@@ -11,12 +11,10 @@ namespace rebounce::bench {
 /// A change of the light under one lamp, or of the surfaces.
 struct LightCase {
   std::string change;               ///< "from zero", "moved 1 %", "switched", "repainted"
-  std::vector<Float3> before;       ///< M0 [n] in lx; empty before a cold start
+  bool cold = false;                ///< whether there is no light before
   std::vector<Float3> after;        ///< M0 [n] in lx
   std::vector<Float3> reflectance;  ///< [n] that holds after the change
   std::vector<Float3> truth;        ///< B [n] in lx: in double precision, to 1e-10
-
-  bool cold() const { return before.empty(); }
 };
 
 /// The change after which surfaces of the commonest material reflect half of what they did.

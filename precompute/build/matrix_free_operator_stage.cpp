@@ -125,11 +125,10 @@ class LinkedOperator {
     const double finer = finer_tolerance(data_.record);
     if (finer > 0) make_again(finer);
     report_.whole_error = clock_.run("check by rays", [&](const Progress& part) {
-      const auto transfer = [&](Exitances lights) {
-        return solved_->solved().indirect_irradiances(lights);
-      };
+      const auto transfer = [&](Exitances lights) { return solver_->nearly_exact(lights); };
       return whole_->estimate(shown_patch, tracer_, transfer, part);
     });
+    solver_.reset();
     solved_.reset();
     // The check is the last step that needs all of them.
     data_.links = decided_.store_links ? std::move(fewer) : FormFactorLinks{};
@@ -185,9 +184,9 @@ class LinkedOperator {
 
   /// Measures the error of the operator under lights of this `seed`.
   void check(std::uint64_t seed) {
-    const CorrectedSolver solver(solved_->solved(), links_, data_.patches, data_.transfer);
+    solver_.emplace(solved_->solved(), links_, data_.patches, data_.transfer);
     const auto truth_of = [&](Exitances some) {
-      return solver.indirect_irradiances(some, reference_residual(decided_.tolerance));
+      return solver_->indirect_irradiances(some, reference_residual(decided_.tolerance));
     };
     whole_.emplace(data_, roles_, decided_.form_factors.seed,
                    WholeErrorEstimator::sample_for(data_.patches.size()));
@@ -205,6 +204,7 @@ class LinkedOperator {
   /// light, and checks it under lights that the first check has not seen.
   void make_again(double finer) {
     whole_.reset();
+    solver_.reset();
     data_.transfer = clock_.run("operator again", [&](const Progress& part) {
       const DrawnLights lights =
           draw_fitting_lights(data_, tracer_, decided_.form_factors.seed, roles_);
@@ -222,6 +222,7 @@ class LinkedOperator {
   std::shared_ptr<const LinkedFormFactors> links_;  ///< from the first light to the last check
   FittedLights lights_;
   std::optional<MatrixFreeTransfer> solved_;
+  std::optional<CorrectedSolver> solver_;  ///< that the last check has used
   std::optional<WholeErrorEstimator> whole_;
   std::vector<KindError> errors_;
 };

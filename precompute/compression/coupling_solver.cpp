@@ -12,12 +12,16 @@
 #include "precompute/base/parallel_progress.h"
 #include "precompute/base/ranks.h"
 #include "precompute/compression/wanted_blocks.h"
+#include "transfer/base/parallel.h"
 
 namespace rebounce {
 namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXf;
+
+// Cells whose vectors are packed together: enough that few packs are not full.
+constexpr std::size_t kPackedCells = 8;
 
 std::string name_of(std::size_t cell) {
   return fmt::format("cell_{:04}", cell);
@@ -44,7 +48,7 @@ CouplingSolver::CouplingSolver(const SolvedTransfer& solved, const SharedBases& 
     : solved_(solved),
       bases_(bases),
       is_wanted_(wanted_columns(cells)),
-      together_(Ranks().least(cells_together)),
+      together_(piece_count(Ranks().least(cells_together), kPackedCells) * kPackedCells),
       checkpoint_(checkpoint),
       couplings_(bases.cell_count()) {
   const auto position = solved.form_factors().position();
@@ -63,23 +67,48 @@ bool CouplingSolver::is_missing(std::size_t cell) const {
   return is_wanted_[cell] && couplings_[cell].size() < bases_.coupling_count(cell);
 }
 
-std::vector<CouplingSolver::Group> CouplingSolver::groups_of(std::size_t first) const {
-  std::vector<Group> groups;
-  for (std::size_t cell = first; cell < std::min(bases_.cell_count(), first + together_); ++cell) {
-    if (!is_missing(cell)) continue;
+bool CouplingSolver::is_missing(const Pack& pack) const {
+  return std::ranges::any_of(pack.parts, [&](const Part& part) { return is_missing(part.cell); });
+}
+
+/// All vectors of one matrix of the wanted cells [begin, end).
+std::vector<CouplingSolver::Pack> CouplingSolver::packs_between(std::size_t begin, std::size_t end,
+                                                                std::uint32_t matrix) const {
+  std::vector<Pack> packs;
+  for (std::size_t cell = begin; cell < end; ++cell) {
+    if (!is_wanted_[cell]) continue;
+    const Index rank = bases_.rank(matrix, cell);
+    for (Index first = 0; first < rank;) {
+      if (packs.empty() || packs.back().width == SolvedTransfer::kBatchColumns) {
+        packs.push_back({matrix, {}});
+      }
+      Pack& pack = packs.back();
+      const Index count = std::min(rank - first, SolvedTransfer::kBatchColumns - pack.width);
+      pack.parts.push_back({cell, first, count});
+      pack.width += count;
+      first += count;
+    }
+  }
+  return packs;
+}
+
+/// The packs of the run that begins with cell `first` that hold a missing cell.
+std::vector<CouplingSolver::Pack> CouplingSolver::packs_of(std::size_t first) const {
+  std::vector<Pack> packs;
+  const std::size_t last = std::min(bases_.cell_count(), first + together_);
+  for (std::size_t begin = first; begin < last; begin += kPackedCells) {
     for (std::uint32_t m = 0; m < solved_.matrix_count(); ++m) {
-      const Index rank = bases_.rank(m, cell);
-      for (Index begin = 0; begin < rank; begin += SolvedTransfer::kBatchColumns) {
-        groups.push_back({cell, m, begin, std::min(SolvedTransfer::kBatchColumns, rank - begin)});
+      for (Pack& pack : packs_between(begin, std::min(last, begin + kPackedCells), m)) {
+        if (is_missing(pack)) packs.push_back(std::move(pack));
       }
     }
   }
-  return groups;
+  return packs;
 }
 
 double CouplingSolver::work_of(std::size_t first) const {
   double work = 0;
-  for (const Group& group : groups_of(first)) work += static_cast<double>(group.count);
+  for (const Pack& pack : packs_of(first)) work += static_cast<double>(pack.width);
   return work;
 }
 
@@ -110,20 +139,22 @@ std::vector<std::vector<float>> CouplingSolver::run(const Progress& progress) {
 }
 
 void CouplingSolver::solve_run(std::size_t first, const Progress& progress) {
-  const std::vector<Group> groups = groups_of(first);
-  for (const Group& group : groups) {
-    couplings_[group.cell].resize(bases_.coupling_count(group.cell));
+  const std::vector<Pack> packs = packs_of(first);
+  std::vector<std::size_t> missing;
+  for (std::size_t cell = first; cell < std::min(bases_.cell_count(), first + together_); ++cell) {
+    if (is_missing(cell)) missing.push_back(cell);
   }
+  for (const std::size_t cell : missing) couplings_[cell].resize(bases_.coupling_count(cell));
   std::exception_ptr failure;
-  ParallelProgress loop(progress, groups.size());
+  ParallelProgress loop(progress, packs.size());
 #pragma omp parallel
   {
     SolvedTransfer::Workspace workspace;
 #pragma omp for schedule(dynamic, 1)
-    for (std::size_t k = 0; k < groups.size(); ++k) {
+    for (std::size_t k = 0; k < packs.size(); ++k) {
       if (loop.stopped()) continue;
       try {
-        solve(groups[k], workspace);
+        solve(packs[k], workspace);
       } catch (...) {
 #pragma omp critical
         failure = std::current_exception();
@@ -133,34 +164,46 @@ void CouplingSolver::solve_run(std::size_t first, const Progress& progress) {
   }
   if (failure) std::rethrow_exception(failure);
   loop.finish();
-  std::size_t before = bases_.cell_count();
-  for (const Group& group : groups) {
-    if (group.cell == before) continue;
-    before = group.cell;
-    checkpoint_.keep(name_of(before), {.blocks = {}, .values = couplings_[before]});
+  for (const std::size_t cell : missing) {
+    checkpoint_.keep(name_of(cell), {.blocks = {}, .values = couplings_[cell]});
   }
 }
 
-void CouplingSolver::solve(const Group& group, SolvedTransfer::Workspace& workspace) {
-  const auto [cell, matrix, begin, count] = group;
-  SolvedTransfer::Vectors sent = SolvedTransfer::Vectors::Zero(solved_.position_count(), count);
-  const MatrixXf& lights = bases_.bases[matrix][cell].lights;
-  for (std::size_t k = 0; k < position_[cell].size(); ++k) {
-    sent.row(position_[cell][k]) = lights.row(static_cast<Index>(k)).segment(begin, count);
+void CouplingSolver::solve(const Pack& pack, SolvedTransfer::Workspace& workspace) {
+  const std::uint32_t matrix = pack.matrix;
+  SolvedTransfer::Vectors sent =
+      SolvedTransfer::Vectors::Zero(solved_.position_count(), pack.width);
+  Index column = 0;
+  for (const auto& [cell, begin, count] : pack.parts) {
+    const MatrixXf& lights = bases_.bases[matrix][cell].lights;
+    for (std::size_t k = 0; k < position_[cell].size(); ++k) {
+      sent.row(position_[cell][k]).segment(column, count) =
+          lights.row(static_cast<Index>(k)).segment(begin, count);
+    }
+    column += count;
   }
   const SolvedTransfer::Vectors& arrived = solved_.later_bounces(matrix, sent, workspace);
-  float* const first = couplings_[cell].data() + bases_.coupling_begin(matrix, cell);
-  const Index rows = bases_.ranks_between(matrix, cell, bases_.cell_count());
-  Eigen::Map<MatrixXf> couplings(first + begin * rows, rows, count);
-  Index row = 0;
-  for (std::size_t d = cell; d < bases_.cell_count(); ++d) {
-    MatrixXf light(position_[d].size(), count);
+  for (std::size_t d = pack.parts.front().cell; d < bases_.cell_count(); ++d) {
+    MatrixXf light(position_[d].size(), pack.width);
     for (std::size_t k = 0; k < position_[d].size(); ++k) {
       light.row(static_cast<Index>(k)) = arrived.row(position_[d][k]);
     }
-    const Index rank = bases_.rank(matrix, d);
-    couplings.middleRows(row, rank).noalias() = bases_.bases[matrix][d].lights.transpose() * light;
-    row += rank;
+    keep(pack, d, bases_.bases[matrix][d].lights.transpose() * light);
+  }
+}
+
+/// Keeps the couplings of the vectors of a pack with those of cell `d`.
+void CouplingSolver::keep(const Pack& pack, std::size_t d, const MatrixXf& found) {
+  Index column = 0;
+  for (const auto& [cell, begin, count] : pack.parts) {
+    if (cell <= d) {
+      const Index rows = bases_.ranks_between(pack.matrix, cell, bases_.cell_count());
+      float* const first = couplings_[cell].data() + bases_.coupling_begin(pack.matrix, cell);
+      Eigen::Map<MatrixXf> couplings(first + begin * rows, rows, count);
+      couplings.middleRows(bases_.ranks_between(pack.matrix, cell, d), found.rows()) =
+          found.middleCols(column, count);
+    }
+    column += count;
   }
 }
 

@@ -24,8 +24,8 @@ class CouplingSolver {
  public:
   /// Finds the cells that `checkpoint` holds. Couplings are wanted of cells in whose columns an
   /// entry on or below the diagonal is, by the roles of the frame. `solved`, `bases` and
-  /// `checkpoint` must outlive the object. `cells_together` > 0 cells are solved for at the same
-  /// time; the bits do not depend on it. Ranks take runs of so many cells in turns.
+  /// `checkpoint` must outlive the object. `cells_together` > 0 cells or a few more are solved for
+  /// at the same time; the bits do not depend on it. Ranks take runs of so many cells in turns.
   CouplingSolver(const SolvedTransfer& solved, const SharedBases& bases, const FramedCells& cells,
                  std::size_t cells_together, const BlockCheckpoint& checkpoint);
 
@@ -37,18 +37,28 @@ class CouplingSolver {
   std::vector<std::vector<float>> run(const Progress& progress);
 
  private:
-  /// Vectors of a cell that one thread solves for.
-  struct Group {
+  /// Neighbouring vectors of the basis of a cell.
+  struct Part {
     std::size_t cell;
-    std::uint32_t matrix;
     Eigen::Index begin, count;
   };
 
+  /// Vectors that one thread solves for. Which ones follows from the ranks of the bases alone, as
+  /// the bits of a product depend on its width.
+  struct Pack {
+    std::uint32_t matrix;
+    std::vector<Part> parts;  ///< ascending
+    Eigen::Index width = 0;
+  };
+
   bool is_missing(std::size_t cell) const;
+  bool is_missing(const Pack& pack) const;
   double work_of(std::size_t first) const;  ///< of the run that begins with this cell
-  std::vector<Group> groups_of(std::size_t first) const;
+  std::vector<Pack> packs_of(std::size_t first) const;
+  std::vector<Pack> packs_between(std::size_t begin, std::size_t end, std::uint32_t matrix) const;
   void solve_run(std::size_t first, const Progress& progress);
-  void solve(const Group& group, SolvedTransfer::Workspace& workspace);
+  void solve(const Pack& pack, SolvedTransfer::Workspace& workspace);
+  void keep(const Pack& pack, std::size_t d, const Eigen::MatrixXf& found);
 
   const SolvedTransfer& solved_;
   const SharedBases& bases_;

@@ -13,17 +13,17 @@ namespace rebounce {
 
 /// Finds the light of links by iterative refinement (J. H. Wilkinson, "Rounding errors in algebraic
 /// processes", 1963). A first guess is off by some thousandths. One gather along the links tells
-/// the residual, and the light of the residual with compressed form factors is the correction. Each
-/// round takes the error to a part of itself that is no larger than that of the guess, so that one
-/// is enough where conjugate gradients along the links gather three times. The few lights for which
-/// it is not, for instance of lamps in nooks, are left to ReferenceSolver.
+/// the residual, and the nearly exact light of the residual is the correction. Each round takes the
+/// error to a part of itself that is about as large as that of the guess, so that one is enough
+/// where conjugate gradients along the links gather three times. The few lights for which it is
+/// not, for instance of lamps in nooks, are left to ReferenceSolver.
 class CorrectedSolver {
  public:
   using Lights = std::vector<std::vector<Float3>>;  ///< [lights][n]
 
-  /// The first guess is that of `nearly_inverse`, an operator that was made from `compressed`; with
-  /// a null pointer, and of one with roles, that of `compressed` itself. `compressed` and `patches`
-  /// must outlive the object.
+  /// Guess and corrections are those of `nearly_inverse`, an operator that was made from
+  /// `compressed`; with a null pointer, and of one with roles, those of `compressed` itself.
+  /// `compressed` and `patches` must outlive the object.
   CorrectedSolver(const SolvedTransfer& compressed, std::shared_ptr<const LinkedFormFactors> links,
                   const PatchTable& patches,
                   std::shared_ptr<const TransferOperator> nearly_inverse = {});
@@ -34,6 +34,9 @@ class CorrectedSolver {
   Lights indirect_irradiances(std::span<const std::vector<Float3>> initial_exitances,
                               double residual) const;
 
+  /// The same, off by what guesses are.
+  Lights nearly_exact(std::span<const std::vector<Float3>> initial_exitances) const;
+
  private:
   /// A light that is still to be solved for.
   struct Open {
@@ -41,7 +44,6 @@ class CorrectedSolver {
     double last_change;  ///< area norm of what the last round has changed
   };
 
-  Lights first_guess(std::span<const std::vector<Float3>> initial_exitances) const;
   Lights gather(const Lights& radiosities) const;
   Lights correct(std::span<const std::vector<Float3>> initial_exitances, const Lights& irradiances,
                  std::span<const Open> open) const;

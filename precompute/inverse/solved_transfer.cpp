@@ -25,9 +25,9 @@ using Factors = Eigen::Array<float, 1, Eigen::Dynamic>;
 constexpr int kMostSteps = 500;
 
 // Number of leading eigenvectors, at most 1 / kLeadingPart of all, and of the multiplications that
-// find them (lab/060).
+// find them (lab/060, lab/145): of the first matrix, and of one that begins with what the last one found.
 constexpr Index kLeadingCount = 256, kLeadingPart = 8;
-constexpr int kLeadingSteps = 6;
+constexpr int kLeadingSteps = 6, kFurtherSteps = 2;
 
 // Rows whose products are summed in single precision before they are added to the double.
 constexpr Index kSummedRows = 128;
@@ -106,7 +106,7 @@ SolvedTransfer::SolvedTransfer(const HierarchicalOperator& form_factors,
     for (std::size_t k = 0; k < patches.size(); ++k) {
       root[static_cast<Index>(k)] = std::sqrt(patches.reflectance[patch()[k]][channel]);
     }
-    leading_.push_back(find_leading(root));
+    leading_.push_back(find_leading(root, m > 0 ? &leading_.back() : nullptr));
   }
 }
 
@@ -120,15 +120,20 @@ SolvedTransfer::SolvedTransfer(const HierarchicalOperator& form_factors,
     : SolvedTransfer(form_factors, std::make_optional<HierarchicalMatrix>(coarse), patches,
                      residual) {}
 
-/// By subspace iteration.
-SolvedTransfer::Leading SolvedTransfer::find_leading(const Eigen::VectorXf& root) const {
+/// By subspace iteration, from those of another matrix if there is one.
+SolvedTransfer::Leading SolvedTransfer::find_leading(const Eigen::VectorXf& root,
+                                                     const Leading* other) const {
   load_blas();
   const auto n = static_cast<Index>(patch().size());
   const Index count = std::clamp<Index>(n / kLeadingPart, 1, kLeadingCount);
   Leading leading;
-  std::mt19937_64 engine(2);
-  leading.vectors = Vectors::NullaryExpr(position_count(), count, [&] { return sign(engine); });
-  for (int step = 0;; ++step) {
+  if (other != nullptr) {
+    leading.vectors = other->vectors;
+  } else {
+    std::mt19937_64 engine(2);
+    leading.vectors = Vectors::NullaryExpr(position_count(), count, [&] { return sign(engine); });
+  }
+  for (int step = other == nullptr ? 0 : kLeadingSteps - kFurtherSteps;; ++step) {
     const Eigen::HouseholderQR<MatrixXf> qr(root.asDiagonal() * leading.vectors);
     leading.vectors = qr.householderQ() * MatrixXf::Identity(position_count(), count);
     const bool last = step == kLeadingSteps;

@@ -93,7 +93,7 @@ class SolvedTransfer {
   /// What steps multiply with.
   const HierarchicalMatrix& of_steps() const { return coarse_ ? *coarse_ : form_factors_; }
 
-  Leading find_leading(const Eigen::VectorXf& root) const;
+  Leading find_leading(const Eigen::VectorXf& root, const Leading* other) const;
 
   /// Adds the part of the solution in the leading eigenvectors, and updates the residual of z.
   void solve_leading(std::uint32_t matrix, Workspace& workspace) const;

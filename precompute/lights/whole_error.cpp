@@ -23,8 +23,9 @@ constexpr double kStudent = 3.182;
 // Rays of a group, and of a patch of it (lab/111, lab/133).
 constexpr double kRaysOfGroup = 1 << 23, kLeastRays = 512, kMostRays = 4096;
 
-// Lights whose groups are spread together.
-constexpr std::size_t kLightsAtOnce = 16;
+// Lights whose groups are spread together; lights that are gathered together: those of all patches
+// stay in the last cache.
+constexpr std::size_t kLightsAtOnce = 16, kLightsGathered = 32;
 
 // Rays take this part of the time of an estimate.
 constexpr double kTracingPart = 0.7;
@@ -198,28 +199,36 @@ WholeErrorEstimator::MetRows WholeErrorEstimator::met_by(std::size_t group, cons
   return by;
 }
 
-/// Adds F B to what `residual_` holds of a group. Where both patches of a pair have rays, what
-/// either side says counts by the inverse of its variance, as in CountedExchange: the rays of a
-/// large patch hardly meet a small one.
-void WholeErrorEstimator::add_gathered(std::size_t group, const MetRows& met,
-                                       std::span<const Float3> by_patch) {
+/// Adds F B, as the rays of a group tell, to what `residual_` holds of it. Where both patches of a
+/// pair have rays, what either side says counts by the inverse of its variance, as in
+/// CountedExchange: the rays of a large patch hardly meet a small one.
+void WholeErrorEstimator::add_gathered(std::size_t group, const MetRows& met) {
   const std::vector<float>& area = data_.patches.area;
-  const std::size_t lights = residual_[group].front().size();
-  std::vector<std::uint32_t> row(data_.patches.size(), kNone);
+  const std::size_t n = data_.patches.size();
+  std::vector<std::uint32_t> row(n, kNone);
   for (std::uint32_t k = 0; k < met.size(); ++k) row[patch_[group][k]] = k;
   const MetRows by = met_by(group, met, row);
   const Ranks ranks;
+  std::vector<Float3> by_patch;
+  for (std::size_t first = 0; first < radiosity_.size(); first += kLightsGathered) {
+    const std::size_t lights = std::min(kLightsGathered, radiosity_.size() - first);
+    by_patch.resize(n * lights);
+    for (std::size_t l = 0; l < lights; ++l) {
+      for (std::size_t i = 0; i < n; ++i) by_patch[i * lights + l] = radiosity_[first + l][i];
+    }
 #pragma omp parallel for schedule(dynamic, 16)
-  for (std::size_t k = 0; k < met.size(); ++k) {
-    if (!ranks.makes(k)) continue;
-    const std::uint32_t i = patch_[group][k];
-    const auto add = [&](const MetPatch& m, float part) {
-      add_to(residual_[group][k], by_patch.subspan(m.patch * lights, lights),
-             part * static_cast<float>(m.count) / static_cast<float>(ray_count_));
-    };
-    const auto share = [&](std::uint32_t j) { return area[j] / (area[i] + area[j]); };
-    for (const MetPatch& m : met[k]) add(m, row[m.patch] == kNone ? 1 : share(m.patch));
-    for (const MetPatch& m : by[k]) add(m, share(m.patch));
+    for (std::size_t k = 0; k < met.size(); ++k) {
+      if (!ranks.makes(k)) continue;
+      const std::uint32_t i = patch_[group][k];
+      const auto sum = std::span(residual_[group][k]).subspan(first, lights);
+      const auto add = [&](const MetPatch& m, float part) {
+        add_to(sum, std::span(by_patch).subspan(m.patch * lights, lights),
+               part * static_cast<float>(m.count) / static_cast<float>(ray_count_));
+      };
+      const auto share = [&](std::uint32_t j) { return area[j] / (area[i] + area[j]); };
+      for (const MetPatch& m : met[k]) add(m, row[m.patch] == kNone ? 1 : share(m.patch));
+      for (const MetPatch& m : by[k]) add(m, share(m.patch));
+    }
   }
   ranks.share(std::span(residual_[group]));
 }
@@ -227,17 +236,12 @@ void WholeErrorEstimator::add_gathered(std::size_t group, const MetRows& met,
 /// Adds F B, as rays tell, to what `residual_` holds.
 void WholeErrorEstimator::gather(std::span<const std::uint32_t> shown_patch,
                                  const RayTracer& tracer, const Progress& progress) {
-  const std::size_t n = data_.patches.size(), lights = radiosity_.size();
-  std::vector<Float3> by_patch(n * lights);
-  for (std::size_t l = 0; l < lights; ++l) {
-    for (std::size_t i = 0; i < n; ++i) by_patch[i * lights + l] = radiosity_[l][i];
-    std::vector<Float3>().swap(radiosity_[l]);
-  }
   for (std::size_t group = 0; group < kGroups; ++group) {
     const double begin = static_cast<double>(group) / kGroups;
     const Progress part = part_of(progress, begin, begin + 1.0 / kGroups);
-    add_gathered(group, trace(group, shown_patch, tracer, part), by_patch);
+    add_gathered(group, trace(group, shown_patch, tracer, part));
   }
+  radiosity_.clear();
 }
 
 /// What a group says of the residual, 0 at patches that are not in it.

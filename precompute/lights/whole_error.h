@@ -75,7 +75,7 @@ class WholeErrorEstimator {
   MetRows trace(std::size_t group, std::span<const std::uint32_t> shown_patch,
                 const RayTracer& tracer, const Progress& progress) const;
   MetRows met_by(std::size_t group, const MetRows& met, std::span<const std::uint32_t> row) const;
-  void add_gathered(std::size_t group, const MetRows& met, std::span<const Float3> by_patch);
+  void add_gathered(std::size_t group, const MetRows& met);
   void gather(std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
               const Progress& progress);
   std::vector<Float3> residual(std::size_t group, std::size_t light) const;
