@@ -25,7 +25,7 @@ using Factors = Eigen::Array<float, 1, Eigen::Dynamic>;
 constexpr int kMostSteps = 500;
 
 // Number of leading eigenvectors, at most 1 / kLeadingPart of all, and of the multiplications that
-// find them (lab/060, lab/145): of the first matrix, and of one that begins with what the last one found.
+// find them (lab/060), also from what the matrix before has found (lab/145).
 constexpr Index kLeadingCount = 256, kLeadingPart = 8;
 constexpr int kLeadingSteps = 6, kFurtherSteps = 2;
 
