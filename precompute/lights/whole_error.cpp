@@ -101,13 +101,8 @@ std::vector<std::uint32_t> spread_choice(std::size_t count, std::size_t all, std
 
 double area_product(std::span<const Float3> a, std::span<const Float3> b,
                     std::span<const float> area) {
-  double sum = 0;
-  for (std::size_t i = 0; i < area.size(); ++i) {
-    double product = 0;
-    for (int c = 0; c < kChannelCount; ++c) product += static_cast<double>(a[i][c]) * b[i][c];
-    sum += area[i] * product;
-  }
-  return sum;
+  const auto [red, green, blue] = area_inner_product(a, b, area);
+  return red + green + blue;
 }
 
 void add_to(std::span<Float3> sum, std::span<const Float3> values, float weight = 1) {

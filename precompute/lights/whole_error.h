@@ -25,10 +25,10 @@ namespace rebounce {
 /// the patch is among them (D. G. Horvitz and D. J. Thompson, "A generalization of sampling without
 /// replacement from a finite universe", 1952). This is done kGroups times, with patches and rays
 /// that are independent of each other. The product of what two groups say of P r is an estimate
-/// without bias of its squared norm, to which the noise of neither adds. P is applied along the
-/// links, which changes the norm by as little as they are off. The confidence is that of a
-/// jackknife over the groups (K. M. Wolter, "Introduction to Variance Estimation", 1985).
-/// notes/concepts/errors.md explains it.
+/// without bias of its squared norm, to which the noise of neither adds. P is applied by an
+/// operator or along the links, which changes the norm by as little as they are off. The confidence
+/// is that of a jackknife over the groups (K. M. Wolter, "Introduction to Variance Estimation",
+/// 1985). notes/concepts/errors.md explains it.
 class WholeErrorEstimator {
  public:
   static constexpr std::size_t kGroups = 4;
@@ -52,8 +52,8 @@ class WholeErrorEstimator {
            std::span<const Float3> result);
 
   /// The errors over all lights; zeros without any. `shown_patch` [t] is that of PatchModel.
-  /// `transfer` is that of the links, or of form factors that are near; a hundredth does not
-  /// matter. No light may be added afterwards. Throws Cancelled if asked to stop.
+  /// `transfer` is that of the links, or of an operator that is near; a hundredth does not matter.
+  /// No light may be added afterwards. Throws Cancelled if asked to stop.
   WholeError estimate(std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
                       const IrradiancesOf& transfer, const Progress& progress = {});
 
