@@ -21,10 +21,11 @@ namespace rebounce {
 /// least 1e-7: the division by R is then safe for black patches, and Y changes by less than 1e-7.
 ///
 /// Single precision is enough. The system is an M-matrix, positive on its diagonal only, so no sum
-/// cancels and every entry keeps its relative error, however small the reflectances by which it is
-/// divided (A. S. Alfa, J. Xue and Q. Ye, "Entrywise perturbation theory for diagonally dominant
-/// M-matrices with applications", 2002). Only the 1 on the diagonal cancels; the diagonal follows
-/// from the other entries by Yhat = G + G R² Yhat.
+/// off the diagonal cancels. A pivot stays above 1 - rho, 0.01 or more. So an entry keeps its
+/// relative error, however small the reflectances by which it is divided (A. S. Alfa, J. Xue and
+/// Q. Ye, "Entrywise perturbation theory for diagonally dominant M-matrices with applications",
+/// 2002). Only the 1 on the diagonal cancels; the diagonal follows from the other entries by
+/// Yhat = G + G R² Yhat.
 ///
 /// Channels with the same reflectances share one matrix. Throws Cancelled if asked to stop.
 std::shared_ptr<const DenseOperator> build_dense_transfer(
