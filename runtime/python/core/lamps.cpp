@@ -4,36 +4,23 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <algorithm>
-#include <array>
 #include <memory>
 #include <string>
 #include <string_view>
-#include <utility>
 
 #include "precompute/import/light_file.h"
+#include "runtime/lights/lamp_kind.h"
 #include "runtime/python/core/arrays.h"
 #include "runtime/python/core/module.h"
 
 namespace rebounce::python {
 namespace {
 
-// As in light files.
-constexpr std::array<std::pair<std::string_view, LightType>, 6> kTypes = {{
-    {"point", LightType::kPoint},
-    {"spot", LightType::kSpot},
-    {"directional", LightType::kDirectional},
-    {"sphere", LightType::kSphere},
-    {"rectangle", LightType::kRectangle},
-    {"disc", LightType::kDisc},
-}};
-
 LightType type_named(const std::string& name) {
-  for (const auto& [known, type] : kTypes) {
-    if (known == name) return type;
-  }
   std::string known_names;
-  for (const auto& [known, type] : kTypes) {
-    known_names += (known_names.empty() ? "" : ", ") + std::string(known);
+  for (const LampKind* kind : lamp_kinds()) {
+    if (kind->name == name) return kind->type;
+    known_names += (known_names.empty() ? "" : ", ") + std::string(kind->name);
   }
   throw py::value_error("type must be one of " + known_names + ", not \"" + name + "\"");
 }
@@ -134,9 +121,7 @@ py::list lights_of(std::span<const Light> lights) {
   py::list result;
   for (const Light& light : lights) {
     py::dict fields;
-    fields["type"] = std::string(std::ranges::find(kTypes, light.type, [](const auto& known) {
-                                   return known.second;
-                                 })->first);
+    fields["type"] = std::string(lamp_kind(light.type).name);
     fields["name"] = light.name;
     fields["position"] = light.position;
     fields["direction"] = light.direction;
