@@ -54,7 +54,9 @@ std::size_t mixed_count(const DisplayMesh& mesh, std::size_t patch_count) {
 std::vector<std::string> build_advice(const TransferData& data, const BuildReport& report) {
   std::vector<std::string> advice;
   const double seconds = seconds_of(report, ""),
-               in_form_factors = seconds_of(report, "form factors");
+               in_form_factors = seconds_of(report, "form factors") +
+                                 seconds_of(report, "finer links") +
+                                 seconds_of(report, "check of links");
   if (seconds > kLongSeconds && in_form_factors > kMostOfTheTime * seconds) {
     advice.push_back(
         fmt::format("form factors took {:.0f} % of the time; for a first look, --quality low or "

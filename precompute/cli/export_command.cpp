@@ -4,6 +4,7 @@
 
 #include "precompute/base/npz_writer.h"
 #include "precompute/cli/commands.h"
+#include "precompute/cli/output_check.h"
 #include "rebounce/error.h"
 #include "transfer/file/transfer_file_io.h"
 
@@ -90,6 +91,7 @@ void add_mesh(const TransferData& data, Export& out) {
 }
 
 void run(const ExportOptions& chosen, const CommonOptions& options) {
+  check_can_write(chosen.output);
   const TransferData data = load_transfer_file(chosen.file);
   Export out;
   if (chosen.what == "patches") add_patches(data, out);

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <new>
 #include <string>
@@ -15,6 +16,8 @@
 namespace {
 
 constexpr int kBadInput = 1, kUsage = 2;
+
+constexpr const char* kOutOfMemory = "rebounce: out of memory; ask for fewer patches\n";
 
 void add_common_options(CLI::App& command, rebounce::cli::CommonOptions& options) {
   command.add_flag(
@@ -71,14 +74,29 @@ int run(int argc, char** argv) {
   return 0;
 }
 
+/// For what nobody can catch, because it leaves a parallel region: memory that ran out there.
+[[noreturn]] void report_and_exit() {
+  try {
+    if (const std::exception_ptr exception = std::current_exception()) {
+      std::rethrow_exception(exception);
+    }
+  } catch (const std::bad_alloc&) {
+    std::fputs(kOutOfMemory, stderr);
+    std::_Exit(kBadInput);
+  } catch (...) {
+  }
+  std::abort();
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   rebounce::cli::install_interrupt_handler();
+  std::set_terminate(report_and_exit);
   try {
     return run(argc, argv);
   } catch (const std::bad_alloc&) {
-    std::fputs("rebounce: out of memory; ask for fewer patches\n", stderr);
+    std::fputs(kOutOfMemory, stderr);
   } catch (const std::exception& error) {
     std::fputs(("rebounce: " + std::string(error.what()) + "\n").c_str(), stderr);
   }

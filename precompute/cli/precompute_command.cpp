@@ -187,6 +187,17 @@ void choose_receivers(const PrecomputeOptions& chosen, ReceiverRowSettings& rows
   if (!is_open) rows.least_error = 0;
 }
 
+/// Refuses options for what a file for pages does not hold.
+void check_for_web(const BuildSettings& settings) {
+  const char* option = nullptr;
+  if (settings.lightmap.size > 0) option = "--lightmap";
+  if (settings.surface_harmonics.ray_count > 0) option = "--surface-harmonics";
+  if (settings.store_links) option = "--store-links";
+  if (settings.store_form_factors) option = "--store-form-factors";
+  if (option == nullptr) return;
+  throw Error(fmt::format("--for web leaves out what {} makes; drop one of the two", option));
+}
+
 /// --memory-limit in bytes; 0 if it is not given.
 std::uint64_t memory_limit_of(double gib) {
   if (gib == 0) return 0;
@@ -208,6 +219,7 @@ BuildSettings settings_of(const PrecomputeOptions& chosen) {
   if (!chosen.precision.empty()) settings.precision = precision_named(chosen.precision);
   settings.operator_kind = operator_kind(chosen.operator_kind);
   choose_receivers(chosen, settings.receiver_rows);
+  if (chosen.reader == "web") check_for_web(settings);
   settings.memory_limit_bytes = memory_limit_of(chosen.memory_limit_gib);
   return settings;
 }

@@ -13,6 +13,7 @@
 #include "precompute/cli/commands.h"
 #include "precompute/cli/frame_cost.h"
 #include "precompute/cli/method_names.h"
+#include "precompute/cli/output_check.h"
 #include "rebounce/error.h"
 #include "runtime/frame/engine_parts.h"
 #include "runtime/solvers/solve_radiosity.h"
@@ -229,6 +230,7 @@ void print_summary(const SolveOptions& chosen, const SolveReport& report, const 
 }
 
 void run(const SolveOptions& chosen, const CommonOptions& options) {
+  check_can_write(chosen.output);
   LightSetup setup;
   const auto data = load_lit_scene(chosen.file, chosen.lights, setup);
   Engine engine(data);

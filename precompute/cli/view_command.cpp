@@ -57,21 +57,23 @@ bool emits(const TransferData& data) {
                              [](const Float3& m) { return m[0] > 0 || m[1] > 0 || m[2] > 0; });
 }
 
-/// The lights that were asked for, or those of the scene, or one lamp if there would be none.
-LightSetup lights_to_begin_with(const ViewOptions& chosen, const Engine& engine) {
+/// The lights that were asked for, `given`, or those of the scene, or one lamp if there would be
+/// none.
+LightSetup lights_to_begin_with(const ViewOptions& chosen, const LightSetup& given,
+                                const Engine& engine) {
+  if (!chosen.lights.empty()) return given;
   const TransferData& data = engine.data();
-  if (!chosen.lights.empty() || !data.lights.empty() || emits(data)) {
-    return choose_lights(chosen.lights, data);
-  }
+  if (!data.lights.empty() || emits(data)) return choose_lights({}, data);
   LightSetup setup;
   setup.lights = {make_key_light(data, *engine.parts().tracer)};
   return setup;
 }
 
 ViewerSetup make_setup(const ViewOptions& chosen, const std::shared_ptr<const TransferData>& data,
-                       const CommonOptions& options, ChosenCamera& camera) {
+                       const LightSetup& given, const CommonOptions& options,
+                       ChosenCamera& camera) {
   Engine engine(data);
-  const LightSetup lights = lights_to_begin_with(chosen, engine);
+  const LightSetup lights = lights_to_begin_with(chosen, given, engine);
   engine.relight(lights.lights, lights.sky);
   warn_of_lamps(engine, lights.lights, options);
   ViewerSetup setup;
@@ -153,12 +155,12 @@ void write_pictures(const ViewOptions& chosen, const std::shared_ptr<const Trans
 
 void run(const ViewOptions& chosen, const CommonOptions& options) {
   if (!chosen.screenshot.empty()) check_can_write(chosen.screenshot);
-  LightSetup lights;
+  LightSetup given;
   const auto data = chosen.lights.empty()
                         ? std::make_shared<const TransferData>(load_transfer_file(chosen.file))
-                        : load_lit_scene(chosen.file, chosen.lights, lights);
+                        : load_lit_scene(chosen.file, chosen.lights, given);
   ChosenCamera camera;
-  ViewerSetup setup = make_setup(chosen, data, options, camera);
+  ViewerSetup setup = make_setup(chosen, data, given, options, camera);
   float frames_per_second = 30;
   if (!chosen.path.empty()) {
     frames_per_second = read_light_path(chosen.path, setup.lights, setup.spheres);

@@ -135,7 +135,7 @@ void run(const ViewFactorOptions& chosen, const CommonOptions& options) {
     fmt::print("{} facets, {} view factors, {:.1f} million rays\n", factors.size(),
                factors.factor.size(), static_cast<double>(factors.ray_count) / 1e6);
     fmt::print(
-        "rows and sky: off 1 by at most {:.1e} as measured apart, by {:.1e} as written; row sums "
+        "rows and sky: off 1 by at most {:.1e} as measured apart, by {:.1e} once closed; row sums "
         "moved by at most {:.1e}\n",
         check.raw_error, check.closed_error, check.moved);
     fmt::print("left out: {} pairs with factors below {:g}, at most {:.1e} of a row\n",

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "precompute/base/blas.h"
+#include "precompute/base/parallel_loop.h"
 #include "precompute/base/parallel_progress.h"
 #include "precompute/compression/block_compression.h"
 #include "precompute/compression/residual_ranks.h"
@@ -289,16 +290,15 @@ BlockPart BlockTreeCompressor::compress(std::span<const BlockPiece> pieces, doub
   const Ranks ranks;
   std::vector<BlockPart> parts(pieces.size());
   ParallelProgress loop(progress, pieces.size());
-#pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t k = 0; k < pieces.size(); ++k) {
-    if (loop.stopped() || !ranks.makes(k)) continue;
+  parallel_loop(pieces.size(), [&](std::size_t k) {
+    if (loop.stopped() || !ranks.makes(k)) return;
     if (wants(pieces[k])) {
       parts[k] =
           PieceCompressor(matrix_, tree_, weights_, wanted_, sizes_, multiplier, pieces[k], loop)
               .compress();
     }
     loop.advance();
-  }
+  });
   loop.finish();
   share(ranks, parts);
   BlockPart whole;

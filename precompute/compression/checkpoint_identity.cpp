@@ -51,6 +51,7 @@ std::string identity_of_rounds(const std::string& couplings, const FittingLights
   update(hash, std::span(std::string_view(couplings)));
   update(hash, std::span(&settings.tolerance, 1));
   update(hash, std::span(std::string_view(precision_name(settings.precision))));
+  update<int>(hash, {{settings.cluster_bases}});
   for (const std::vector<Float3>& light : lights.validation) update<Float3>(hash, light);
   return hash.text();
 }

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "precompute/base/blas.h"
+#include "precompute/base/parallel_loop.h"
 
 namespace rebounce {
 namespace {
@@ -122,11 +123,10 @@ std::vector<ClusterWeight> make_cluster_weights(std::span<const Cluster> cluster
                                    std::numeric_limits<double>::min());
   load_blas();
   std::vector<Principal> principal(clusters.size());
-#pragma omp parallel for schedule(dynamic, 1)
-  for (std::size_t k = 0; k < clusters.size(); ++k) {
+  parallel_loop(clusters.size(), [&](std::size_t k) {
     const Cluster& cluster = clusters[k];
     principal[k] = principal_directions(relative.middleRows(cluster.begin, cluster.count));
-  }
+  });
   std::vector<ClusterWeight> weights;
   weights.reserve(principal.size());
   for (std::size_t k = 0; k < principal.size(); ++k) {

@@ -110,21 +110,18 @@ std::shared_ptr<const HierarchicalOperator> build_low_rank_transfer(const DenseO
   const DenseMatrix matrix(dense);
   const auto n = static_cast<Index>(matrix.area().size());
   const Index rank = std::min(n, static_cast<Index>(settings.rank));
-  const auto report = [&](double done) {
-    if (progress && !progress(done)) throw Cancelled();
-  };
-  report(0);
+  report_progress(progress, 0);
   const Index columns = rank + rank / kSketchPart + kSketchMargin;
   MatrixXf basis = MatrixXf::Identity(n, n);
   if (n > kDenseSize && columns < n) {
     basis = orthonormal(random_start(n, columns));
     for (int k = 0; k < kIterations; ++k) {
       basis = iterate(matrix, basis);
-      report((k + 1.0) / (kIterations + 1));
+      report_progress(progress, (k + 1.0) / (kIterations + 1));
     }
   }
   const RitzVectors vectors = ritz_vectors(matrix, basis, rank);
-  report(1);
+  report_progress(progress, 1);
 
   return std::make_shared<const HierarchicalOperator>(
       encode_values(one_block(dense.storage(), vectors), settings.precision));

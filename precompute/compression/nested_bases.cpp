@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "precompute/base/blas.h"
+#include "precompute/base/parallel_loop.h"
 #include "precompute/compression/residual_ranks.h"
 
 namespace rebounce {
@@ -113,16 +114,14 @@ class Nesting {
   /// Finds the bases; true if they reduce error and size together.
   bool pays() {
     if (ends_.empty()) return false;
-#pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t k = 0; k < ends_.size(); ++k) weigh(ends_[k]);
+    parallel_loop(ends_.size(), [&](std::size_t e) { weigh(ends_[e]); });
     bases_.resize(cells_.cluster.size());
     for (std::size_t e = 0; e < ends_.size(); ++e) {
       for (std::size_t c = ends_[e].first_cell; c < ends_[e].last_cell; ++c) {
         bases_[c].ends.push_back(e);
       }
     }
-#pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t c = 0; c < bases_.size(); ++c) find_directions(c);
+    parallel_loop(bases_.size(), [&](std::size_t c) { find_directions(c); });
     fill_groups();
     double gain = 0;
     for (std::size_t c = 0; c < bases_.size(); ++c) gain += gain_of(c);
@@ -130,29 +129,22 @@ class Nesting {
   }
 
   Storage nested() {
-#pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t c = 0; c < bases_.size(); ++c) make_basis(c);
-#pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t e = 0; e < ends_.size(); ++e) find_coefficients(ends_[e]);
+    parallel_loop(bases_.size(), [&](std::size_t c) { make_basis(c); });
+    parallel_loop(ends_.size(), [&](std::size_t e) { find_coefficients(ends_[e]); });
     for (NestedEnd& end : ends_) fold(end);
     fit_couplings();
-#pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t c = 0; c < bases_.size(); ++c) find_residual_ranks(c);
+    parallel_loop(bases_.size(), [&](std::size_t c) { find_residual_ranks(c); });
     return assemble();
   }
 
  private:
   using Vectors = Eigen::Map<const RowMajor>;
 
-  const Cluster& cell(std::size_t c) const {
-    return tree_.clusters[cells_.cluster[c]];
-  }
+  const Cluster& cell(std::size_t c) const { return tree_.clusters[cells_.cluster[c]]; }
   const ClusterWeight& weight_of_cell(std::size_t c) const {
     return frame_.weights[cells_.cluster[c]];
   }
-  double multiplier() const {
-    return frame_.cost.multiplier;
-  }
+  double multiplier() const { return frame_.cost.multiplier; }
 
   /// The basis of one side of a block, [rank][positions].
   Vectors basis(std::size_t b, bool is_row) const {
@@ -274,8 +266,8 @@ class Nesting {
     const CellBasis& own = bases_[c];
     const auto size = static_cast<Index>(cell(c).count);
     const double before = frame_.cost.size(size * own.stacked, 0, 0);
-    const double after =
-        frame_.cost.size((size + own.stacked) * own.rank, own.rank, 0) + kCellOverhead;
+    const double after = frame_.cost.size((size + own.stacked) * own.rank, own.rank, 0) +
+                         (own.rank > 0 ? kCellOverhead : 0);
     return multiplier() * (before - after) - own.energies.tail(size - own.rank).sum();
   }
 
@@ -319,6 +311,9 @@ class Nesting {
       const VectorXd norm = end.transfer_matrix.rowwise().norm().cast<double>();
       end.folded = (norm.array() > 0).select(norm, 1).asDiagonal();
       end.transfer_matrix.rowwise().normalize();
+      for (Index r = 0; r < norm.size(); ++r) {
+        if (!(norm[r] > 0)) end.transfer_matrix.row(r).setZero();
+      }
     }
     scale_errors(end, end.folded);
   }

@@ -82,16 +82,14 @@ ResidualRanks find_residual_ranks(const LowRankBlock& block, const BlockWeights&
 double coupling_step(const LowRankBlock& block, const BlockWeights& weights,
                      const CompressionCost& cost) {
   // Rounding to a step is an error of step² / 12 in the mean, and a bit less makes it four times
-  // as large. A unit of size has the bits of a half. Widths are multiples of four bits, and a row
-  // has that of its largest entry: an operator is smallest at a fourth of the step of this price
-  // (lab/079).
-  constexpr double kBitsOfUnit = 16, kPart = 0.25;
+  // as large. A unit of size has the bits of a half (lab/079, lab/146).
+  constexpr double kBitsOfUnit = 16;
   const bool on_diagonal = block.column_basis.cols() == 0;
   const double effect =
       weighted_size({block.row_basis, weights.row}) +
       weighted_size({on_diagonal ? block.row_basis : block.column_basis, weights.column});
   if (effect == 0) return 0;
-  return kPart * std::sqrt(12 * cost.multiplier / (kBitsOfUnit * 2 * std::numbers::ln2 * effect));
+  return std::sqrt(12 * cost.multiplier / (kBitsOfUnit * 2 * std::numbers::ln2 * effect));
 }
 
 }  // namespace rebounce

@@ -33,9 +33,9 @@ Eigen::Index worthwhile_residual_rank(const Eigen::MatrixXd& vectors, double mul
 ResidualRanks find_residual_ranks(const LowRankBlock& block, const BlockWeights& weights,
                                   const CompressionCost& cost);
 
-/// The step to which the entries of the coupling matrix of a block are rounded: a fourth of the one
-/// at which a bit more of each entry costs as much as the error that it removes. The error is
-/// summed as that of find_residual_ranks, and the same is asked of the bases.
+/// The step to which the entries of the coupling matrix of a block are rounded: a bit more of each
+/// entry costs as much as the error that it removes. The error is summed as that of
+/// find_residual_ranks, and the same is asked of the bases.
 double coupling_step(const LowRankBlock& block, const BlockWeights& weights,
                      const CompressionCost& cost);
 

@@ -3,11 +3,11 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <exception>
 #include <numeric>
 #include <span>
 
 #include "precompute/base/blas.h"
+#include "precompute/base/parallel_loop.h"
 #include "precompute/base/random_signs.h"
 #include "precompute/base/ranks.h"
 #include "precompute/compression/light_weights.h"
@@ -124,18 +124,11 @@ class BasisSampler {
     const Ranks ranks;
     const auto rows = static_cast<Index>(frame_.tree.patch.size());
     MatrixXf light(rows, kSamples);
-    std::exception_ptr failure;
-#pragma omp parallel for schedule(dynamic, 1)
-    for (Index begin = 0; begin < kSamples; begin += kGroupSamples) {
-      if (!ranks.makes(static_cast<std::size_t>(begin / kGroupSamples))) continue;
-      try {
-        draw_group(matrix, number * kSamples + begin, light.middleCols(begin, kGroupSamples));
-      } catch (...) {
-#pragma omp critical
-        failure = std::current_exception();
-      }
-    }
-    if (failure) std::rethrow_exception(failure);
+    parallel_loop(kSamples / kGroupSamples, [&](std::size_t group) {
+      if (!ranks.makes(group)) return;
+      const Index begin = static_cast<Index>(group) * kGroupSamples;
+      draw_group(matrix, number * kSamples + begin, light.middleCols(begin, kGroupSamples));
+    });
     ranks.share(std::span(light.data(), static_cast<std::size_t>(light.size())),
                 static_cast<std::size_t>(kGroupSamples * rows));
     Samples samples;
@@ -148,8 +141,7 @@ class BasisSampler {
   /// The directions of samples `from`, with the energies of other samples.
   std::vector<Directions> find_directions(const Samples& from, const Samples& judges) const {
     std::vector<Directions> cells(from.size());
-#pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t c = 0; c < cells.size(); ++c) {
+    parallel_loop(cells.size(), [&](std::size_t c) {
       const MatrixXd light = from[c].cast<double>();
       MatrixXd gram = MatrixXd::Zero(light.rows(), light.rows());
       gram.selfadjointView<Eigen::Lower>().rankUpdate(light);
@@ -161,7 +153,7 @@ class BasisSampler {
       VectorXd& missing = cells[c].missing;
       missing.setZero(energies.size() + 1);
       for (Index k = energies.size(); k-- > 0;) missing[k] = missing[k + 1] + energies[k];
-    }
+    });
     return cells;
   }
 
@@ -170,15 +162,14 @@ class BasisSampler {
   double squared_error(std::span<const Directions> cells, std::span<const Index> ranks,
                        const Samples& judges) const {
     std::vector<double> missing(cells.size());
-#pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t c = 0; c < cells.size(); ++c) {
+    parallel_loop(cells.size(), [&](std::size_t c) {
       const MatrixXd light = judges[c].cast<double>();
       const auto kept = cells[c].vectors.leftCols(ranks[c]);
       MatrixXd left = MatrixXd::Zero(cells_[c].cluster.count, light.cols());
       left.topRows(light.rows()) = light - kept * (kept.transpose() * light);
       if (cells_[c].weight != nullptr) cells_[c].weight->unweigh_rows(left);
       missing[c] = left.squaredNorm() / static_cast<double>(light.cols());
-    }
+    });
     return error_of_energy_ * std::accumulate(missing.begin(), missing.end(), 0.0);
   }
 
@@ -211,9 +202,7 @@ class BasisSampler {
     Index patch_count() const { return static_cast<Index>(patches.size()); }
   };
 
-  bool has_role(std::uint32_t patch) const {
-    return frame_.roles.has(patch, PatchRoles::kBoth);
-  }
+  bool has_role(std::uint32_t patch) const { return frame_.roles.has(patch, PatchRoles::kBoth); }
 
   /// Random light of a cell, as strong as its weight, [positions of the cluster][k].
   MatrixXd random_light(const Cell& cell, std::uint64_t seed) const {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -113,12 +114,20 @@ class WorstLights {
   void join(const ReferenceLighting& validation, std::span<const double> errors,
             MatrixCompression& compression) {
     joined_.resize(errors.size());
+    std::vector<std::size_t> joining;
     for (std::size_t k = 0; k < errors.size(); ++k) {
-      if (errors[k] <= limit_ || joined_[k] || count_ == kMostJoined) continue;
+      if (errors[k] > limit_ && !joined_[k]) joining.push_back(k);
+    }
+    if (joining.size() > kMostJoined - count_) {  // the worst of them
+      std::ranges::stable_sort(joining, std::greater<>(), [&](std::size_t k) { return errors[k]; });
+      joining.resize(kMostJoined - count_);
+      std::ranges::sort(joining);
+    }
+    for (const std::size_t k : joining) {
       compression.add_training_light(validation, k);
       joined_[k] = true;
-      ++count_;
     }
+    count_ += joining.size();
   }
 
  private:

@@ -1,42 +1,23 @@
 #include "precompute/import/gltf_document.h"
 
 #include <fmt/format.h>
-#include <xxhash.h>
 
 #include <algorithm>
 #include <array>
 #include <initializer_list>
 #include <iterator>
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "precompute/import/gltf_meshopt.h"
 #include "precompute/import/gltf_resources.h"
 #include "precompute/import/gltf_validation.h"
 #include "rebounce/error.h"
+#include "transfer/file/content_hash.h"
 
 namespace rebounce::gltf {
 namespace {
 
 using nlohmann::json;
-
-class Hash {
- public:
-  Hash() : state_(XXH3_createState(), XXH3_freeState) {
-    if (!state_) throw std::bad_alloc();
-    XXH3_128bits_reset(state_.get());
-  }
-
-  void add(Bytes bytes) { XXH3_128bits_update(state_.get(), bytes.data(), bytes.size()); }
-
-  std::string text() const {
-    const XXH128_hash_t hash = XXH3_128bits_digest(state_.get());
-    return fmt::format("xxh3:{:016x}{:016x}", hash.high64, hash.low64);
-  }
-
- private:
-  std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state_;
-};
 
 // The objects of the array `key`; empty if there is no such array.
 json& elements(json& parent, const char* key) {
@@ -45,10 +26,10 @@ json& elements(json& parent, const char* key) {
 }
 
 // Keeps the data of `uri` for the lifetime of the document.
-Bytes store_resource(Document& document, Hash& hash, const std::filesystem::path& folder,
+Bytes store_resource(Document& document, ContentHash& hash, const std::filesystem::path& folder,
                      const std::string& uri) {
   Resource resource = read_resource(folder, uri);
-  if (resource.external) hash.add(resource.bytes);
+  if (resource.external) hash.update(std::as_bytes(std::span(resource.bytes)));
   return document.storage.emplace_back(std::move(resource.bytes));
 }
 
@@ -58,7 +39,7 @@ Bytes first_bytes(Bytes bytes, std::size_t length) {
                           length, bytes.size()));
 }
 
-Bytes read_buffer(Document& document, Hash& hash, const json& buffer,
+Bytes read_buffer(Document& document, ContentHash& hash, const json& buffer,
                   const std::filesystem::path& folder) {
   const auto length = buffer.at("byteLength").get<std::size_t>();
   const Bytes bytes =
@@ -66,8 +47,8 @@ Bytes read_buffer(Document& document, Hash& hash, const json& buffer,
   return first_bytes(bytes, length);
 }
 
-void read_buffers(Document& document, Hash& hash, const json& root, const Container& container,
-                  const std::filesystem::path& folder) {
+void read_buffers(Document& document, ContentHash& hash, const json& root,
+                  const Container& container, const std::filesystem::path& folder) {
   if (!root.contains("buffers")) return;
   const json& buffers = root.at("buffers");
   for (std::size_t i = 0; i < buffers.size(); ++i) {
@@ -133,7 +114,7 @@ std::map<std::pair<std::size_t, std::size_t>, DracoSource> draco_sources(json& r
 void count_deformations(json& root, Warnings& warnings) {
   for (const json& node : elements(root, "nodes")) {
     if (node.contains("mesh") && node.contains("skin")) {
-      warnings.count("{} skinned meshes are taken in their bind pose");
+      warnings.count("{} skinned meshes stand as their nodes place them, without their skin");
     }
   }
   for (json& mesh : elements(root, "meshes")) {
@@ -203,7 +184,7 @@ tinygltf::Model parse_structure(const json& root) {
   return model;
 }
 
-EncodedImage read_image(Document& document, Hash& hash, const json& image,
+EncodedImage read_image(Document& document, ContentHash& hash, const json& image,
                         const std::filesystem::path& folder) {
   if (image.contains("bufferView")) {
     return {view_bytes(document, image.at("bufferView").get<int>()), ""};
@@ -218,7 +199,7 @@ EncodedImage read_image(Document& document, Hash& hash, const json& image,
   }
 }
 
-void read_images(Document& document, Hash& hash, const json& root,
+void read_images(Document& document, ContentHash& hash, const json& root,
                  const std::filesystem::path& folder) {
   if (!root.contains("images")) return;
   const json& images = root.at("images");
@@ -237,8 +218,8 @@ Document read_document(const std::filesystem::path& path, Warnings& warnings) {
   const auto folder = std::filesystem::absolute(path).parent_path();
   Document document;
   const Bytes file = document.storage.emplace_back(read_file(path));
-  Hash hash;
-  hash.add(file);
+  ContentHash hash;
+  hash.update(std::as_bytes(file));
 
   const Container container = split_container(file);
   json root = parse_json(container.json);

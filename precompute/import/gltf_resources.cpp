@@ -69,6 +69,11 @@ std::filesystem::path contained_path(const std::filesystem::path& folder, const 
 }
 
 std::vector<std::uint8_t> decode_data_uri(const std::string& uri) {
+  // tinygltf knows no WebP, and images are told apart by their content.
+  constexpr std::string_view kWebp = "data:image/webp;base64,";
+  if (uri.starts_with(kWebp)) {
+    return decode_data_uri("data:image/png;base64," + uri.substr(kWebp.size()));
+  }
   std::vector<std::uint8_t> bytes;
   std::string mime_type;
   if (!tinygltf::IsDataURI(uri) || !tinygltf::DecodeDataURI(&bytes, mime_type, uri, 0, false)) {

@@ -8,6 +8,7 @@
 #include "precompute/lights/reference_solution.h"
 #include "precompute/lights/solve_batches.h"
 #include "transfer/base/area_norm.h"
+#include "transfer/base/light_sum.h"
 #include "transfer/base/reflection.h"
 
 namespace rebounce {
@@ -23,12 +24,6 @@ constexpr double kLeastResidual = 1e-10;
 
 // Lights that one gather along the links takes: their sums just fill the registers.
 constexpr std::size_t kGathered = 8, kRows = kGathered * kChannelCount;
-
-void add(std::span<const Float3> values, float factor, std::span<Float3> sum) {
-  for (std::size_t i = 0; i < sum.size(); ++i) {
-    for (int c = 0; c < kChannelCount; ++c) sum[i][c] += factor * values[i][c];
-  }
-}
 
 }  // namespace
 
@@ -97,7 +92,7 @@ Lights CorrectedSolver::indirect_irradiances(std::span<const std::vector<Float3>
     std::vector<Open> left;
     for (std::size_t k = 0; k < open.size(); ++k) {
       std::vector<Float3>& light = result[open[k].light];
-      add(corrected[k], -1, light);
+      add_to(light, corrected[k], -1);
       const double change = area_norm(light, patches_.area);
       light = corrected[k];
       // What is left is the same part of this change as it is of the last one.
@@ -118,17 +113,17 @@ Lights CorrectedSolver::correct(std::span<const std::vector<Float3>> initial_exi
   for (const Open& o : open) {
     std::vector<Float3>& b = radiosities.emplace_back(irradiances[o.light]);
     reflect(patches_.reflectance, b);
-    add(initial_exitances[o.light], 1, b);
+    add_to(b, initial_exitances[o.light]);
   }
   Lights result = gather(radiosities);
   Lights& reflected = radiosities;
   for (std::size_t k = 0; k < open.size(); ++k) {
     reflected[k] = result[k];
-    add(irradiances[open[k].light], -1, reflected[k]);
+    add_to(reflected[k], irradiances[open[k].light], -1);
     reflect(patches_.reflectance, reflected[k]);
   }
   const Lights corrections = nearly_exact(reflected);
-  for (std::size_t k = 0; k < open.size(); ++k) add(corrections[k], 1, result[k]);
+  for (std::size_t k = 0; k < open.size(); ++k) add_to(result[k], corrections[k]);
   return result;
 }
 

@@ -3,11 +3,11 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <exception>
 #include <random>
 #include <utility>
 
 #include "precompute/base/blas.h"
+#include "precompute/base/parallel_loop.h"
 #include "precompute/base/ranks.h"
 #include "precompute/inverse/dense_transfer.h"
 #include "rebounce/error.h"
@@ -209,10 +209,10 @@ MatrixXf SolvedTransfer::multiply(std::uint32_t matrix, const MatrixXf& x) const
   load_blas();
   const Ranks ranks;
   MatrixXf result(x.rows(), x.cols());
-  std::exception_ptr failure;
-#pragma omp parallel for schedule(dynamic, 1)
-  for (Index begin = 0; begin < x.cols(); begin += kSmallGroup) {
-    if (!ranks.makes(static_cast<std::size_t>(begin / kSmallGroup))) continue;
+  const Index groups = (x.cols() + kSmallGroup - 1) / kSmallGroup;
+  parallel_loop(static_cast<std::size_t>(groups), [&](std::size_t group) {
+    if (!ranks.makes(group)) return;
+    const Index begin = static_cast<Index>(group) * kSmallGroup;
     const Index width = std::min(kSmallGroup, x.cols() - begin);
     Vectors in = Vectors::Zero(position_count(), width);
     Workspace workspace;
@@ -220,19 +220,13 @@ MatrixXf SolvedTransfer::multiply(std::uint32_t matrix, const MatrixXf& x) const
       in.row(static_cast<Index>(k)) = x.row(patch()[k]).segment(begin, width);
     }
     form_factors_.multiply(0, in, workspace.first, workspace.products);
-    try {
-      solve(matrix, workspace);
-    } catch (...) {
-#pragma omp critical
-      failure = std::current_exception();
-    }
+    solve(matrix, workspace);
     for (std::size_t k = 0; k < patch().size(); ++k) {
       const auto row = static_cast<Index>(k);
       result.row(patch()[k]).segment(begin, width) =
           workspace.first.row(row) + workspace.solution.row(row);
     }
-  }
-  if (failure) std::rethrow_exception(failure);
+  });
   share_groups(ranks, result);
   return result;
 }

@@ -26,7 +26,7 @@ class SolvedTransfer {
   using Vectors = HierarchicalMatrix::Vectors;
 
   /// Right-hand sides that one thread solves side by side. More of them make matrix products larger
-  /// and take more memory: five times as many vectors for each thread (lab/060).
+  /// and take more memory: nine vectors for each of them and each thread (lab/060).
   static constexpr Eigen::Index kBatchColumns = 128;
 
   /// `form_factors` are G. A solution is accepted when the norm of the residual of z is at most

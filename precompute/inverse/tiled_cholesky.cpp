@@ -16,7 +16,7 @@ class StageProgress {
   StageProgress(const Progress& progress, std::size_t steps) : progress_(progress), steps_(steps) {}
 
   void report(int stage, double done_of_stage) const {
-    if (progress_ && !progress_((stage + done_of_stage) / 3)) throw Cancelled();
+    report_progress(progress_, (stage + done_of_stage) / 3);
   }
   double fraction(std::size_t step) const {
     return static_cast<double>(step + 1) / static_cast<double>(steps_);

@@ -10,6 +10,7 @@
 #include "runtime/rays/patch_points.h"
 #include "runtime/rays/sampling.h"
 #include "transfer/base/area_norm.h"
+#include "transfer/base/light_sum.h"
 #include "transfer/base/reflection.h"
 
 namespace rebounce {
@@ -103,12 +104,6 @@ double area_product(std::span<const Float3> a, std::span<const Float3> b,
                     std::span<const float> area) {
   const auto [red, green, blue] = area_inner_product(a, b, area);
   return red + green + blue;
-}
-
-void add_to(std::span<Float3> sum, std::span<const Float3> values, float weight = 1) {
-  for (std::size_t i = 0; i < sum.size(); ++i) {
-    for (int c = 0; c < kChannelCount; ++c) sum[i][c] += weight * values[i][c];
-  }
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <span>
 
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/sampling.h"
@@ -38,12 +39,11 @@ std::vector<EmitterPoint> spread(const DisplayMesh& mesh, std::span<const std::u
 
 }  // namespace
 
-std::vector<EmitterPoints> spread_over_emitters(const TransferData& data,
-                                                std::span<const std::uint32_t> shown_patch,
-                                                int most_each, int most) {
-  std::map<std::uint32_t, std::vector<std::uint32_t>> triangles;  // of each patch that emits
-  for (std::uint32_t t = 0; t < shown_patch.size(); ++t) {
-    const std::uint32_t patch = shown_patch[t];
+std::vector<EmitterPoints> spread_over_emitters(const TransferData& data, int most_each, int most) {
+  // Of each patch that emits. Copies in the same place have no patch, and count once so.
+  std::map<std::uint32_t, std::vector<std::uint32_t>> triangles;
+  for (std::uint32_t t = 0; t < data.mesh.triangle_patch.size(); ++t) {
+    const std::uint32_t patch = data.mesh.triangle_patch[t];
     if (patch != kNone && emits(data, patch)) triangles[patch].push_back(t);
   }
   if (triangles.empty()) return {};

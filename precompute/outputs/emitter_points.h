@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "transfer/file/transfer_data.h"
@@ -22,9 +21,7 @@ struct EmitterPoints {
 
 /// Points on each patch of `data` that emits, in the order of the patches. There are `most_each`
 /// points on a patch; fewer, but at least one, if there would be more than `most` in all.
-/// `shown_patch` is that of PatchModel. Deterministic.
-std::vector<EmitterPoints> spread_over_emitters(const TransferData& data,
-                                                std::span<const std::uint32_t> shown_patch,
-                                                int most_each, int most);
+/// Deterministic.
+std::vector<EmitterPoints> spread_over_emitters(const TransferData& data, int most_each, int most);
 
 }  // namespace rebounce

@@ -183,12 +183,10 @@ void trace_probes(const TransferData& data, std::span<const std::uint32_t> shown
   probes.sky_cells = {.entry_begin = {0}, .entry_cell = {}, .entry_weight = {}};
   probes.patch_count = data.patches.size();
   const std::vector<EmitterPoints> emitters =
-      spread_over_emitters(data, shown_patch, kMostPoints, kPointsPerRay * settings.ray_count);
+      spread_over_emitters(data, kMostPoints, kPointsPerRay * settings.ray_count);
   std::vector<std::optional<ProbeView>> views;
   for (std::size_t first = 0; first < probes.size(); first += kProbeBatch) {
-    if (progress && !progress(static_cast<double>(first) / static_cast<double>(probes.size()))) {
-      throw Cancelled();
-    }
+    report_progress(progress, static_cast<double>(first) / static_cast<double>(probes.size()));
     const std::size_t count = std::min(kProbeBatch, probes.size() - first);
     views.resize(count);
 #pragma omp parallel

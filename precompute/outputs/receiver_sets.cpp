@@ -100,7 +100,7 @@ class SetChoice {
             .cast<float>()
             .transpose()
             .cwiseQuotient(rows_.light);
-    // Column by column: BLAS may sum in an order that depends on the number of threads.
+    // Column by column, so that the sum has one order whatever BLAS is loaded.
     Eigen::MatrixXf off = -all * mean.transpose();
     for (Eigen::Index k = 0; k < count; ++k) off.noalias() += part.col(k) * lit_.row(from + k);
     const double receivers = static_cast<double>(part.rows());

@@ -79,9 +79,7 @@ SurfaceHarmonics trace_surface_harmonics(const TransferData& data,
   harmonics.entry_begin = harmonics.sky_cells.entry_begin = {0};
   std::vector<PatchView> views;
   for (std::size_t first = 0; first < n; first += kPatchBatch) {
-    if (progress && !progress(static_cast<double>(first) / static_cast<double>(n))) {
-      throw Cancelled();
-    }
+    report_progress(progress, static_cast<double>(first) / static_cast<double>(n));
     const std::size_t count = std::min(kPatchBatch, n - first);
     views.resize(count);
 #pragma omp parallel

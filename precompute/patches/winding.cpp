@@ -40,7 +40,7 @@ constexpr double kLeastBackCoverage = 0.02;
 // light.
 constexpr double kNoExchange = 1e-3;
 
-// [t] The piece of each triangle, numbered by the first triangle of the piece.
+// [t] The piece of each triangle, numbered by one of its triangles.
 std::vector<std::uint32_t> find_pieces(const Scene& scene, const WeldedPositions& place) {
   const auto corner = [&](std::uint32_t t) {
     const auto& [a, b, c] = scene.triangle[t];

@@ -41,15 +41,22 @@ GpuLamp gpu_lamp_at(const rebounce_gpu_lamp* lamps, std::size_t k) {
   rebounce_gpu_lamp_init(&defaults);
   check_struct_size(stated_size(lamps), kGpuLampSize1, kInit);
   const char* const entry = reinterpret_cast<const char*>(lamps) + k * stated_size(lamps);
-  const rebounce_gpu_lamp given = take(entry, defaults, kGpuLampSize1, kInit);
   const std::string name = "lamp " + std::to_string(k);
+  if (stated_size(entry) != stated_size(lamps)) {
+    throw Error(name + " has another struct_size than the first; fill it with " + kInit);
+  }
+  const rebounce_gpu_lamp given = take(entry, defaults, kGpuLampSize1, kInit);
   if (given.light == nullptr) throw Error(name + " has no light");
   if (given.shadow_map > REBOUNCE_GPU_CUBE) {
     throw Error(name + " has a shadow map of kind " + std::to_string(given.shadow_map) +
                 ", which does not exist; give one of rebounce_gpu_shadow_map");
   }
   GpuLamp lamp;
-  take_light(given.light, 0, lamp.light);
+  try {
+    take_light(given.light, 0, lamp.light);
+  } catch (const Error& error) {
+    throw Error(name + ": " + error.what());
+  }
   lamp.shadow_map = static_cast<GpuShadowMap>(given.shadow_map);
   lamp.texture = given.texture;
   if (given.views != nullptr)

@@ -135,12 +135,20 @@ void check_lamp(std::size_t number, const GpuLamp& lamp) {
   }
 }
 
+/// The views that its shadow map has; others do not count, and are not looked at.
+std::span<const GpuShadowView> views_of(const GpuLamp& lamp) {
+  const bool has_views =
+      lamp.shadow_map == GpuShadowMap::kPlane || lamp.shadow_map == GpuShadowMap::kLayers;
+  return has_views ? lamp.views : std::span<const GpuShadowView>();
+}
+
 LampBlock block_of(const GpuLamp& lamp) {
   const PreparedLight light(lamp.light);
+  const std::span<const GpuShadowView> views = views_of(lamp);
   const bool has_place = light.kind->has_place();
   LampBlock block;
   block.kind = {has_place ? 1U : 2U, static_cast<std::uint32_t>(lamp.shadow_map),
-                static_cast<std::uint32_t>(lamp.views.size()), 0};
+                static_cast<std::uint32_t>(views.size()), 0};
   block.position = {light.position.x, light.position.y, light.position.z,
                     has_place ? 1 / light.reach_squared : 0};
   const bool has_cone = light.kind->uses(kCone);
@@ -149,9 +157,8 @@ LampBlock block_of(const GpuLamp& lamp) {
   const glm::vec3 color = to_glm(lamp.light.color) * lamp.light.intensity;
   block.color = {color.x, color.y, color.z, has_cone ? light.cone_scale : 1};
   block.depth_range = {1 / lamp.depth_range[0], 1 / lamp.depth_range[1], kTexelsOffSurface, 0};
-  for (std::size_t k = 0; k < lamp.views.size(); ++k) {
-    block.views[k] = {lamp.views[k].texture_from_world,
-                      {static_cast<float>(lamp.views[k].layer), 0, 0, 0}};
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    block.views[k] = {views[k].texture_from_world, {static_cast<float>(views[k].layer), 0, 0, 0}};
   }
   return block;
 }

@@ -13,7 +13,13 @@ constexpr float kLeastDivisor = 1e-30F;  // of a place at the point itself
 }  // namespace
 
 Sides sides_around(const glm::vec3& axis, const glm::vec3& tangent) {
-  const glm::vec3 side = glm::normalize(tangent - glm::dot(tangent, axis) * axis);
+  glm::vec3 across = tangent - glm::dot(tangent, axis) * axis;
+  // A light path may turn the axis of a lamp until it is along the tangent.
+  constexpr float kLeastAcross = 1e-12F;
+  if (!(glm::dot(across, across) > kLeastAcross * glm::dot(tangent, tangent))) {
+    across = glm::cross(axis, least_axis(axis));
+  }
+  const glm::vec3 side = glm::normalize(across);
   return {side, glm::cross(side, axis)};
 }
 

@@ -1,7 +1,9 @@
 #include "runtime/lights/light_sampling.h"
 
 #include <algorithm>
+#include <cmath>
 
+#include "rebounce/error.h"
 #include "runtime/lights/lamp_kind.h"
 #include "runtime/rays/float3_glm.h"
 
@@ -31,6 +33,9 @@ void check_light(const Light& light) {
     check_field(light, *field);
   }
   for (const LampField* field : kind.fields) check_field(light, *field);
+  if (!std::isfinite(light.intensity * std::ranges::max(light.color))) {
+    throw Error("a light's intensity times its color must be finite");
+  }
   if (!light.profile || !kind.uses(kProfile)) return;
   check_field(light, kDirection);
   check_field(light, kTangent);

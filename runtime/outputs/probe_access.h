@@ -4,7 +4,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <string>
 
 #include "rebounce/error.h"
 #include "rebounce/scene_data.h"
@@ -16,13 +15,6 @@ inline void check_probes(const LightProbes& probes) {
   if (probes.size() == 0) {
     throw Error("the transfer file has no light probes; make it with --probes");
   }
-}
-
-/// Throws Error if an argument of a function on probes has the wrong size.
-inline void check_probe_size(std::size_t size, std::size_t wanted, const char* name) {
-  if (size == wanted) return;
-  throw Error(std::string("probes: ") + name + " has " + std::to_string(size) +
-              " entries; it must have " + std::to_string(wanted));
 }
 
 /// The position of a coordinate in a row of evenly spaced probes.

@@ -8,6 +8,7 @@
 #include "runtime/outputs/probe_access.h"
 #include "runtime/outputs/seen_sky.h"
 #include "runtime/outputs/spherical_harmonics.h"
+#include "transfer/base/argument_check.h"
 
 namespace rebounce {
 namespace {
@@ -120,8 +121,8 @@ void irradiance_at_probes(const LightProbes& probes, std::span<const Float3> rad
                           std::span<Float3> irradiance, const Scheduler& scheduler) {
   if (probes.size() == 0 && irradiance.empty()) return;
   check_probes(probes);
-  check_probe_size(irradiance.size(), probes.size() * normals.size(), "the irradiance");
-  check_probe_size(radiosity.size(), probes.patch_count, "the radiosity");
+  check_size("probes: the irradiance", irradiance.size(), probes.size() * normals.size());
+  check_size("probes: the radiosity", radiosity.size(), probes.patch_count);
   const SeenSky seen_sky(probes.sky, probes.sky_cells, sky);
   for_each_block(normals, [&](const NormalBlock& block, std::size_t first) {
     parallel_for_pieces(scheduler, probes.size(), kBakedProbesPerTask, [&](std::size_t p) {
@@ -136,8 +137,8 @@ void irradiance_in_air(const LightProbes& probes, std::span<const Float3> radios
                        const Float3& position, std::span<const Float3> normals,
                        std::span<Float3> irradiance) {
   check_probes(probes);
-  check_probe_size(irradiance.size(), normals.size(), "the irradiance");
-  check_probe_size(radiosity.size(), probes.patch_count, "the radiosity");
+  check_size("probes: the irradiance", irradiance.size(), normals.size());
+  check_size("probes: the radiosity", radiosity.size(), probes.patch_count);
   const SeenSky seen_sky(probes.sky, probes.sky_cells, sky);
   for_each_block(normals, [&](const NormalBlock& block, std::size_t first) {
     IrradianceSum sum(block);

@@ -6,6 +6,7 @@
 #include "runtime/outputs/probe_access.h"
 #include "runtime/outputs/seen_sky.h"
 #include "runtime/outputs/spherical_harmonics.h"
+#include "transfer/base/argument_check.h"
 
 namespace rebounce {
 namespace {
@@ -52,8 +53,8 @@ void apply(const LightProbes& probes, std::span<const Float3> radiosity, const S
            const LightOf& light_of, std::span<Light> light, const Scheduler& scheduler) {
   if (probes.size() == 0 && light.empty()) return;
   check_probes(probes);
-  check_probe_size(light.size(), probes.size(), "the result");
-  check_probe_size(radiosity.size(), probes.patch_count, "the radiosity");
+  check_size("probes: the result", light.size(), probes.size());
+  check_size("probes: the radiosity", radiosity.size(), probes.patch_count);
   const SeenSky seen_sky(probes.sky, probes.sky_cells, sky);
   parallel_for_pieces(scheduler, probes.size(), kProbesPerTask,
                       [&](std::size_t p) { light[p] = light_of(probes, p, radiosity, seen_sky); });
@@ -93,7 +94,7 @@ ProbeLight interpolate_probes(const LightProbes& probes, std::span<const ProbeLi
 ProbeLight gather_probe_light(const LightProbes& probes, std::span<const Float3> radiosity,
                               const Sky& sky, const Float3& position) {
   check_probes(probes);
-  check_probe_size(radiosity.size(), probes.patch_count, "the radiosity");
+  check_size("probes: the radiosity", radiosity.size(), probes.patch_count);
   const SeenSky seen_sky(probes.sky, probes.sky_cells, sky);
   ProbeLight sum{};
   const float total = for_each_probe_around(probes, position, [&](std::size_t probe, float weight) {

@@ -1,11 +1,10 @@
 #include "runtime/outputs/surface_light.h"
 
 #include <algorithm>
-#include <string>
 
-#include "rebounce/error.h"
 #include "runtime/outputs/seen_sky.h"
 #include "runtime/outputs/spherical_harmonics.h"
+#include "transfer/base/argument_check.h"
 
 namespace rebounce {
 namespace {
@@ -14,12 +13,6 @@ constexpr std::size_t kPatchesPerTask = 64, kNormalsPerTask = 512;
 
 // A larger gain is not reliable: the series may be too small at the surface's own normal.
 constexpr float kLargestGain = 4;
-
-void check_size(std::size_t size, std::size_t wanted, const char* name) {
-  if (size == wanted) return;
-  throw Error(std::string("surface harmonics: ") + name + " has " + std::to_string(size) +
-              " entries; it must have " + std::to_string(wanted));
-}
 
 void add(SurfaceLight& sum, const LinearHarmonics& weight, const Float3& color) {
   for (std::size_t k = 0; k < kLinearHarmonicCount; ++k) {
@@ -33,8 +26,8 @@ void apply_surface_harmonics(const SurfaceHarmonics& harmonics, std::span<const 
                              const Sky& sky, std::span<SurfaceLight> light,
                              const Scheduler& scheduler) {
   const std::size_t n = harmonics.sky.size();
-  check_size(light.size(), n, "the result");
-  check_size(radiosity.size(), n, "the radiosity");
+  check_size("surface harmonics: the result", light.size(), n);
+  check_size("surface harmonics: the radiosity", radiosity.size(), n);
   const SeenSky seen_sky(harmonics.sky, harmonics.sky_cells, sky);
   parallel_for_pieces(scheduler, n, kPatchesPerTask, [&](std::size_t i) {
     SurfaceLight sum{};
@@ -48,7 +41,7 @@ void apply_surface_harmonics(const SurfaceHarmonics& harmonics, std::span<const 
 
 void reconstruct_at_vertices(const DisplayMesh& mesh, std::span<const SurfaceLight> patch_light,
                              std::span<SurfaceLight> vertex_light, const Scheduler& scheduler) {
-  check_size(vertex_light.size(), mesh.position.size(), "the light at vertices");
+  check_size("surface harmonics: the light at vertices", vertex_light.size(), mesh.position.size());
   parallel_for_pieces(scheduler, vertex_light.size(), kNormalsPerTask, [&](std::size_t v) {
     SurfaceLight sum{};
     if (!mesh.weight_begin.empty()) {

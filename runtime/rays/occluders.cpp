@@ -16,6 +16,9 @@ namespace {
 
 using Outline = std::vector<glm::dvec2>;  // counter-clockwise
 
+// Cuts of one plane. A round outline of n sides takes n cuts, and time that grows with n³.
+constexpr int kMostCuts = 512;
+
 struct Side {
   glm::dvec2 from, to;  // what it bounds is on its left
 
@@ -53,15 +56,19 @@ class ConvexPieces {
 
   std::vector<Outline> take() { return std::move(piece_); }
 
+  /// False if the pieces do not cover the surface, because it would take more than kMostCuts.
+  bool is_whole() const { return cuts_ <= kMostCuts; }
+
  private:
   /// `side`: those that may pass through `cell`.
   void cut(Outline cell, std::vector<Side> side) {
-    if (cell.size() < 3) return;
+    if (cell.size() < 3 || !is_whole()) return;
     std::erase_if(side, [&](const Side& s) { return is_on_border(cell, s); });
     if (side.empty()) {
       if (is_inside(cell)) piece_.push_back(std::move(cell));
       return;
     }
+    if (++cuts_ > kMostCuts) return;
     const Side line = *std::ranges::max_element(side, {}, &Side::length);
     for (const bool left : {true, false}) {
       std::vector<Side> part;
@@ -122,6 +129,7 @@ class ConvexPieces {
 
   std::span<const Side> side_;
   double tolerance_;
+  int cuts_ = 0;
   std::vector<Outline> piece_;
 };
 
@@ -170,7 +178,9 @@ class Planes {
 
   Occluders take() const {
     Occluders occluders{.piece = {}, .is_whole = is_whole_};
-    for (const Plane& plane : plane_) add_pieces(plane, occluders.piece);
+    for (const Plane& plane : plane_) {
+      if (!add_pieces(plane, occluders.piece)) occluders.is_whole = false;
+    }
     return occluders;
   }
 
@@ -241,9 +251,12 @@ class Planes {
     return sides;
   }
 
-  void add_pieces(const Plane& plane, std::vector<Occluder>& occluders) const {
+  /// False if they do not cover the whole plane.
+  bool add_pieces(const Plane& plane, std::vector<Occluder>& occluders) const {
     const bool solid = mesh_.opacity.of_triangle(plane.triangle[0]).empty();
-    for (const Outline& piece : ConvexPieces(outline(plane), tolerance_).take()) {
+    const std::vector<Side> sides = outline(plane);
+    ConvexPieces pieces(sides, tolerance_);
+    for (const Outline& piece : pieces.take()) {
       // Fans of pieces with four corners, if there are more.
       for (std::size_t k = 1; k + 1 < piece.size(); k += 2) {
         const std::array<std::size_t, Occluder::kCorners> number{0, k, k + 1,
@@ -256,6 +269,7 @@ class Planes {
         occluders.push_back(occluder);
       }
     }
+    return pieces.is_whole();
   }
 
   const DisplayMesh& mesh_;

@@ -72,7 +72,8 @@ class RayTracer {
   void intersect(std::span<const Ray> rays, std::span<Hit> hits,
                  Passage passage = Passage::kHoles) const;
 
-  /// Appends every hit of `ray` to `hits`, in a deterministic order that is not by distance.
+  /// Appends every hit of `ray` to `hits`, in a deterministic order that is not by distance. A
+  /// triangle may come twice.
   void intersect_all(const Ray& ray, std::vector<Hit>& hits) const;
 
   /// `point` moved by offset_distance() along the unit `geometric_normal`, so that a ray that

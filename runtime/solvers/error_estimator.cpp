@@ -8,6 +8,7 @@
 #include "runtime/solvers/file_form_factors.h"
 #include "transfer/base/area_norm.h"
 #include "transfer/base/argument_check.h"
+#include "transfer/base/light_sum.h"
 #include "transfer/base/reflection.h"
 
 namespace rebounce {
@@ -19,20 +20,6 @@ void check_operator(const TransferOperator* transfer) {
     throw Error(
         "error estimate: the operator has receivers or sources, and errors can be estimated only "
         "without; precompute without --receivers and --sources");
-  }
-}
-
-/// value += other.
-void add(std::span<const Float3> other, std::span<Float3> value) {
-  for (std::size_t i = 0; i < value.size(); ++i) {
-    for (int c = 0; c < kChannelCount; ++c) value[i][c] += other[i][c];
-  }
-}
-
-/// value -= other.
-void subtract(std::span<const Float3> other, std::span<Float3> value) {
-  for (std::size_t i = 0; i < value.size(); ++i) {
-    for (int c = 0; c < kChannelCount; ++c) value[i][c] -= other[i][c];
   }
 }
 
@@ -111,21 +98,21 @@ ErrorEstimate ErrorEstimator::estimate_error(std::span<const Float3> initial_exi
   }
   add_reflected(initial_exitance, reflectance, indirect_irradiance, p.light);
   p.gather(p.light, p.residual, scheduler);
-  subtract(indirect_irradiance, p.residual);
+  add_to(p.residual, indirect_irradiance, -1);
 
   std::ranges::copy(p.residual, p.light.begin());
   reflect(reflectance, p.light);
   p.data->transfer->apply(p.light, p.correction, p.transfer_workspace, scheduler);
-  add(p.residual, p.correction);
+  add_to(p.correction, p.residual);
 
   std::ranges::copy(p.correction, p.light.begin());
   reflect(reflectance, p.light);
   const double error = p.norm(p.correction);
-  subtract(p.correction, p.residual);
-  add(indirect_irradiance, p.correction);
+  add_to(p.residual, p.correction, -1);
+  add_to(p.correction, indirect_irradiance);
   const double solution = p.norm(p.correction);
   p.gather(p.light, p.correction, scheduler);
-  add(p.correction, p.residual);
+  add_to(p.residual, p.correction);
   const double rest = p.limit_of(p.residual);
 
   if (error == 0 && rest == 0) return {};

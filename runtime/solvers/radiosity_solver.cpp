@@ -157,6 +157,8 @@ SolveResult RadiositySolver::iterate(const SolveSettings& settings, Clock::time_
     }
     // The bound was reached but the residual is larger: continue from the measured residual.
     confirmed = result.residual;
+    best = std::numeric_limits<double>::infinity();
+    since_best = 0;
     begin(false);
   }
   result.converged =

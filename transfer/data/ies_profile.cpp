@@ -22,6 +22,8 @@ class IesReader {
   IesReader(std::string_view text, const std::string& name) : rest_(text), name_(name) {}
 
   std::shared_ptr<const IntensityProfile> read() {
+    // From 1995 on the first line names the year, and the ballast-lamp factor is 1 or no factor.
+    const bool is_old = !rest_.starts_with("IESNA:LM-63-") && !rest_.starts_with("IES:LM-63-");
     skip_to_tilt();
     number("number of lamps");
     number("lumens per lamp");
@@ -31,7 +33,8 @@ class IesReader {
     if (number("photometric type") != 1) refuse("is not of photometric type C");
     for (const char* what : {"units", "width", "length", "height"}) number(what);
     scale *= number("ballast factor");
-    number("ballast-lamp factor");
+    const float ballast_lamp_factor = number("ballast-lamp factor");
+    if (is_old) scale *= ballast_lamp_factor;
     number("input watts");
     if (!(scale >= 0)) refuse("has a negative multiplier");
 

@@ -8,8 +8,8 @@ namespace rebounce {
 CompressedFormFactors::CompressedFormFactors(std::shared_ptr<const HierarchicalOperator> exchange)
     : exchange_(std::move(exchange)) {
   if (!exchange_) throw Error("compressed form factors: there are none");
-  for (const std::uint32_t matrix : exchange_->storage().channel_matrix) {
-    if (matrix != 0) throw Error("compressed form factors: the channels have different matrices");
+  if (exchange_->storage().matrix_count != 1) {
+    throw Error("compressed form factors: the channels have different matrices");
   }
   if (!exchange_->storage().coefficient_scale.empty()) {
     throw Error(

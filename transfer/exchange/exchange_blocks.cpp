@@ -1,6 +1,7 @@
 #include "transfer/exchange/exchange_blocks.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "transfer/exchange/planes.h"
 #include "transfer/kernels/kernels.h"
@@ -18,7 +19,7 @@ ExchangeBlocks::ExchangeBlocks(const ExchangeMatrix& exchange, std::span<const f
     const auto columns = rows.columns(i);
     const std::size_t group_begin = i / kGroup * kGroup;
     std::uint32_t last = kNone;
-    inside_begin_.push_back(kNone);
+    inside_begin_.push_back(std::numeric_limits<std::uint64_t>::max());
     for (std::size_t k = 0; k < columns.size() && columns[k] <= i; ++k) {
       const float exchange_area = rows.form_factors(i)[k] * area[i];
       if (columns[k] == i) {

@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "rebounce/error.h"
+#include "transfer/base/argument_check.h"
 #include "transfer/exchange/links_by_node.h"
 #include "transfer/kernels/kernels.h"
 #include "transfer/kernels/link_gather.h"
@@ -352,6 +353,8 @@ void LinkedFormFactors::do_gather(std::span<const Float3> in, std::span<Float3> 
 
 template <typename Columns>
 void LinkedFormFactors::gather(std::span<const Columns> in, std::span<Columns> out) const {
+  check_size("links: light", in.size(), patch_count());
+  check_size("links: gathered light", out.size(), patch_count());
   std::vector<LinkLightOf<Columns>> light(node_count()), arrived(node_count());
   tree_->gather(in, out, light.data(), arrived.data(), fastest_gather<Columns>(), {});
 }

@@ -12,7 +12,11 @@ namespace {
 
 using nlohmann::json;
 
-/// Checks the depth of a parse and the keys of each open object.
+// At the end of an object the parser looks at all entries of what the object is in. More looks than
+// this take seconds.
+constexpr std::size_t kMostLooks = std::size_t{1} << 28U;
+
+/// Checks the depth of a parse, the keys of each open object, and the work of the parser.
 class Watch {
  public:
   explicit Watch(std::size_t max_depth) : max_depth_(max_depth) {}
@@ -21,29 +25,46 @@ class Watch {
     switch (event) {
       case json::parse_event_t::object_start:
       case json::parse_event_t::array_start:
-        if (keys_.size() == max_depth_) {
+        if (open_.size() == max_depth_) {
           throw Error("JSON nested more than " + std::to_string(max_depth_) + " deep");
         }
-        keys_.emplace_back();
+        count_entry();
+        open_.emplace_back();
         break;
       case json::parse_event_t::object_end:
+        open_.pop_back();
+        if (!open_.empty()) looks_ += open_.back().entry_count;
+        if (looks_ > kMostLooks) throw Error("JSON with too many objects side by side");
+        break;
       case json::parse_event_t::array_end:
-        keys_.pop_back();
+        open_.pop_back();
         break;
       case json::parse_event_t::key:
-        if (!keys_.back().insert(value.get_ref<const std::string&>()).second) {
+        if (!open_.back().keys.insert(value.get_ref<const std::string&>()).second) {
           throw Error("the key " + value.dump() + " appears twice");
         }
         break;
       case json::parse_event_t::value:
+        count_entry();
         break;
     }
     return true;
   }
 
  private:
+  /// An object or array that has not ended.
+  struct Open {
+    std::set<std::string> keys;
+    std::size_t entry_count = 0;
+  };
+
+  void count_entry() {
+    if (!open_.empty()) ++open_.back().entry_count;
+  }
+
   std::size_t max_depth_;
-  std::vector<std::set<std::string>> keys_;
+  std::size_t looks_ = 0;
+  std::vector<Open> open_;
 };
 
 }  // namespace

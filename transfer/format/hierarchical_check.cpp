@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "rebounce/error.h"
+#include "transfer/base/finite_values.h"
 #include "transfer/data/patch_roles.h"
 #include "transfer/format/hierarchical_layout.h"
 
@@ -45,6 +46,8 @@ void check_exponents(std::span<const std::int8_t> exponents, std::size_t patch_c
 /// coefficients.
 struct IndexRanges {
   std::size_t position_count, cluster_coefficient_count;
+  /// [cluster_coefficient_count + 1] whether a cluster basis begins there; true at the end.
+  std::vector<bool> is_border;
 
   /// Whether [begin, begin + count) is an aligned, non-empty range of positions.
   bool are_positions(std::uint64_t begin, std::uint64_t count) const {
@@ -53,6 +56,11 @@ struct IndexRanges {
   bool are_cluster_coefficients(std::uint64_t begin, std::uint64_t count) const {
     return are_aligned(begin, count) && begin >= position_count &&
            begin + count <= position_count + cluster_coefficient_count;
+  }
+  /// Whether a range of positions or of cluster coefficients cuts no cluster basis.
+  bool cuts_no_basis(std::uint64_t begin, std::uint64_t count) const {
+    return begin < position_count ||
+           (is_border[begin - position_count] && is_border[begin + count - position_count]);
   }
 
  private:
@@ -80,6 +88,10 @@ void check_block(const TransferBlock& block, const IndexRanges& ranges) {
   if (!is_range(block.row_begin, block.row_count) ||
       !is_range(block.column_begin, block.column_count)) {
     refuse("a block is empty, not aligned or reaches outside the matrix");
+  }
+  if (!ranges.cuts_no_basis(block.row_begin, block.row_count) ||
+      !ranges.cuts_no_basis(block.column_begin, block.column_count)) {
+    refuse("a block begins or ends within the coefficients of a cluster basis");
   }
   const bool misplaced = block.on_diagonal()
                              ? block.row_count != block.column_count
@@ -130,6 +142,17 @@ std::size_t checked_cluster_coefficient_count(const Storage& storage, std::size_
   return end - position_count;
 }
 
+/// IndexRanges::is_border.
+std::vector<bool> borders_of_cluster_bases(const Storage& storage, std::size_t position_count,
+                                           std::size_t coefficient_count) {
+  std::vector<bool> is_border(coefficient_count + 1, false);
+  is_border.back() = true;
+  for (const TransferBlock& block : storage.blocks) {
+    if (is_cluster_basis(block)) is_border[block.column_begin - position_count] = true;
+  }
+  return is_border;
+}
+
 void check_tables(const Storage& storage) {
   const std::size_t n = storage.area.size();
   if (n == 0) refuse("there are no patches");
@@ -147,7 +170,9 @@ void check_tables(const Storage& storage) {
     refuse(error.what());
   }
   const std::size_t positions = HierarchicalFormat::position_count(n);
-  const IndexRanges ranges{positions, checked_cluster_coefficient_count(storage, positions)};
+  const std::size_t coefficients = checked_cluster_coefficient_count(storage, positions);
+  const IndexRanges ranges{positions, coefficients,
+                           borders_of_cluster_bases(storage, positions, coefficients)};
   for (const TransferBlock& block : storage.blocks) {
     check_block(block, ranges);
     const bool one_rank =
@@ -202,6 +227,9 @@ void check_hierarchical_storage(const Storage& storage) {
     refuse("bases in integers are not in the streamed order");
   }
   if (!sizes_fit(storage)) refuse("the number of values does not fit the blocks");
+  if (!are_finite(storage.values_f32.span()) || !halves_are_finite(storage.values_f16.span())) {
+    refuse("a value is not finite");
+  }
 }
 
 }  // namespace rebounce

@@ -65,8 +65,9 @@ SharedArray<Value> stream_array(const Storage& storage, const Storage& in_order,
   return SharedArray(std::move(streamed));
 }
 
-/// Divides all entries by the smallest power of four that brings them into the range of halves, and
-/// multiplies the scales of positions to match. Does nothing if the operator has no such scales.
+/// Divides all entries, and the steps that they are rounded to, by the smallest power of four that
+/// brings them into the range of halves, and multiplies the scales of positions to match. Does
+/// nothing if the operator has no such scales.
 void fit_halves(Storage& exact) {
   if (exact.scale_exponent.empty()) return;
   // Half of the range of a half: rounding the bases makes entries of coupling matrices a little
@@ -81,6 +82,9 @@ void fit_halves(Storage& exact) {
   const int power = static_cast<int>(std::ceil(std::log2(largest / kMost) / 2));
   std::vector<float> values(exact.values_f32.begin(), exact.values_f32.end());
   for (float& entry : std::span(values).subspan(begin)) entry = std::ldexp(entry, -2 * power);
+  for (TransferBlock& block : exact.blocks) {
+    block.coupling_step = std::ldexp(block.coupling_step, -2 * power);
+  }
   for (std::int8_t& exponent : exact.scale_exponent) {
     exponent = static_cast<std::int8_t>(exponent + power);
   }

@@ -57,8 +57,8 @@ struct BasisPart {
 template <typename Value>
 struct BasisKernels {
   /// coefficient[r] = sum over k of basis[r][k] x[k], for the lights of x and the ranks of each
-  /// part, over all positions of its cluster. With integers, first_rank is a multiple of
-  /// HierarchicalFormat::kRankGroup, and coefficients are written up to the next multiple.
+  /// part, over all positions of its cluster. With integers whole groups of
+  /// HierarchicalFormat::kRankGroup ranks are written: coefficients of neighbouring ranks too.
   /// `runs` [lights][x.stride / LightRun::kPositions], from BlockKernels::measure_light, or null:
   /// then integer kernels measure the light themselves. Others do not look at it.
   void (*project)(const Value* values, std::span<const BasisPart> parts,

@@ -88,7 +88,7 @@ struct IntegerScales {
 };
 
 /// Light below this is as dark as none.
-constexpr float kDark = 0x1p-100F;
+constexpr float kDark = 0x1p-97F;  // integers of 30 bits over it stay below the largest float
 
 // Light is uneven if its largest magnitude exceeds this many times the mean, and this many times
 // the mean of its darkest run that has any. The brightest patches of a chunk may see only the sky;

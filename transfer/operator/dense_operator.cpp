@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "rebounce/error.h"
+#include "transfer/base/finite_values.h"
 #include "transfer/base/half_float.h"
 #include "transfer/kernels/kernels.h"
 
@@ -136,6 +137,9 @@ DenseOperator::DenseOperator(Storage storage) : storage_(std::move(storage)) {
   const bool half = storage_.precision == Precision::kF16;
   if ((half ? storage_.tiles_f16.size() : storage_.tiles_f32.size()) != values) {
     throw Error("dense operator: the number of tiles does not fit the number of patches");
+  }
+  if (!are_finite(storage_.tiles_f32.span()) || !halves_are_finite(storage_.tiles_f16.span())) {
+    throw Error("dense operator: a value is not finite");
   }
   for (const std::uint32_t matrix : storage_.channel_matrix) {
     if (matrix >= storage_.matrix_count) throw Error("dense operator: a channel has no matrix");

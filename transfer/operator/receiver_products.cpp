@@ -20,7 +20,8 @@ ReceiverProducts::ReceiverProducts(const ReceiverRows& rows, std::span<const flo
     before[k + 1] = before[k] + static_cast<double>(area[rows.patch[k]]);
   }
   for (const auto& [begin, end] : rows.set) {
-    inverse_area_.push_back(1 / (before[end] - before[begin]));
+    const double covered = before[end] - before[begin];  // 0 where the sum loses a tiny area
+    inverse_area_.push_back(covered > 0 ? 1 / covered : 0);
   }
 }
 

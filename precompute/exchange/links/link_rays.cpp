@@ -47,12 +47,14 @@ LinkRays::Visibility LinkRays::trace(std::uint32_t a, std::uint32_t b, int count
   const auto first = static_cast<int>(hash % kMostRays);
   const PointSequence from = r2_sequence(unit_square(hash)),
                       to = r2_sequence(unit_square(mix_bits(hash + 1)));
+  // Strata of equal area of one node are joined to those of the other in steps of a prime that does
+  // not divide their number.
+  const int step = count % 19 == 0 ? 17 : 19;
   scratch.rays.resize(count);
   std::array<double, kMostRays> weight;
   std::array<int, kMostRays> children;  // the pair of children that each ray joins
   for (int k = 0; k < count; ++k) {
-    // Joins strata of equal area of one node to those of the other, in steps of 19.
-    const int other = (19 * k + first) % count;
+    const int other = (step * k + first) % count;
     const double along_a = (k + shift.x) / count, along_b = (other + shift.y) / count;
     const std::uint32_t i = tree_.patch_at(tree_[a], along_a),
                         j = tree_.patch_at(tree_[b], along_b);

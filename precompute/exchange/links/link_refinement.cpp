@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <utility>
 
 #include "precompute/base/ranks.h"
 #include "rebounce/error.h"
@@ -110,7 +111,7 @@ void LinkRefinement::revise(const std::vector<bool>& doubtful, const Progress& p
 }
 
 double LinkRefinement::forecast(double epsilon, std::size_t sample, const Progress& progress) {
-  epsilon_ = epsilon;
+  const double kept_epsilon = std::exchange(epsilon_, epsilon);
   double count = 0, weight = 1;
   std::vector<Candidate> generation{{0, 0, View::kUnknown}};
   std::vector<Outcome> outcomes;
@@ -138,6 +139,7 @@ double LinkRefinement::forecast(double epsilon, std::size_t sample, const Progre
     }
     generation = std::move(next);
   }
+  epsilon_ = kept_epsilon;
   return count;
 }
 

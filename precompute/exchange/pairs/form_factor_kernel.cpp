@@ -207,11 +207,6 @@ FlatTriangle::FlatTriangle(const glm::dvec3& a, const glm::dvec3& b, const glm::
   for (const glm::dvec3& v : vertex) radius = std::max(radius, glm::distance(v, centroid));
 }
 
-bool can_exchange(const FlatTriangle& a, const FlatTriangle& b) {
-  const double tolerance = plane_tolerance(a, b);
-  return side_of_plane(b, a).highest > tolerance && side_of_plane(a, b).highest > tolerance;
-}
-
 double contour_exchange_area(const FlatTriangle& a, const FlatTriangle& b) {
   const double tolerance = plane_tolerance(a, b);
   const Polygon front_of_a = clip_to_front(a, b, tolerance);

@@ -27,9 +27,6 @@ struct FlatTriangle {
   double stopping_area() const { return area * stopping_part; }
 };
 
-/// True if some point on the front of each triangle lies in front of the other.
-bool can_exchange(const FlatTriangle& a, const FlatTriangle& b);
-
 /// Exchange area A_a F_ab = A_b F_ba in m² between the fronts of two triangles with nothing between
 /// them: symmetric in a and b up to rounding, >= 0.
 ///

@@ -164,6 +164,7 @@ class RawExchangeBuilder {
   void compute_row(std::uint32_t i, const Wanted& wanted, Scratch& scratch,
                    std::vector<ExchangeEntry>& row) {
     append_fine(i, settings_.probe_rays, wanted, scratch, row);
+    pair_count_ += scratch.facing.size();
     append_coarse(i, row);
     row.shrink_to_fit();  // all rows together are the largest thing there is
     std::ranges::sort(row, {}, &ExchangeEntry::column);
@@ -179,7 +180,6 @@ class RawExchangeBuilder {
     for (FacingPatch& pair : scratch.facing) pair.count = hemisphere_->find(i, pair.patch).count;
     scratch.pairs.ray_count = 0;
     pair_exchange_->measure(i, scratch.facing, probe, scratch.pairs, row);
-    pair_count_ += scratch.facing.size();
     ray_count_ += scratch.pairs.ray_count;
   }
 

@@ -12,8 +12,8 @@ std::vector<RowSumTarget> row_sum_targets(std::span<const Escape> escape, int ra
     // ray may have begun beyond the wall of an edge, by the offset of rays. Otherwise the
     // uncertainty follows from the rule of succession; low-discrepancy rays have about half the
     // error of random ones. If all rays are lost, the patch sees nothing, with certainty.
-    const bool closed = lost * count < 1.5;
     const bool unseeing = lost * count > count - 0.5;
+    const bool closed = !unseeing && lost * count < 1.5;
     const double p = (lost * count + 1) / (count + 2);
     const double seen = unseeing ? 0 : 1 - lost;
     target.push_back({closed ? 1 : seen, closed ? 0 : 0.5 * std::sqrt(p * (1 - p) / count)});

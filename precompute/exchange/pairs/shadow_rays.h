@@ -58,7 +58,7 @@ class VisibilityEstimate {
 /// visible fraction of their exchange. Immutable, usable from any number of threads.
 class ShadowRays {
  public:
-  /// The largest number of rays of a pair.
+  /// The largest setting of rays of a pair; large pairs that are partly hidden get more.
   static constexpr std::uint32_t kMostRays = 256;
 
   /// `geometry` must outlive the object. `seed` decides which points of a pair are joined;

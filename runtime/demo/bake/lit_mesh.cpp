@@ -204,6 +204,7 @@ void light_vertices(const VertexLighter& lighter, LitMesh& lit) {
 LitMesh light_mesh(const TransferData& data, const RayTracer& tracer, const PictureLight& light,
                    const Camera& camera, const LitMeshSettings& settings) {
   if (settings.samples_per_vertex < 1) throw Error("a lit mesh needs at least one sample a vertex");
+  if (data.mesh.triangle.empty()) throw Error("the scene has no triangles to bake");
   if (settings.exposure) check_exposure(*settings.exposure);
   const std::vector<std::uint8_t> in_texture = triangles_with_texels(data);
   const auto count_in_texture =

@@ -28,5 +28,5 @@ void main() {
     barrier();
     if (thread < half_size) part[thread] += part[thread + half_size];
   }
-  if (thread == 0u) set_light[index] = part[0] / part[0].w;
+  if (thread == 0u) set_light[index] = part[0].w > 0.0 ? part[0] / part[0].w : vec4(0.0);
 }

@@ -23,8 +23,9 @@ struct DirectLightingSettings {
   /// Places of a lamp with a surface that each point looks at, from 1 to 64. More: smoother half
   /// shadows; time of such lamps grows in proportion.
   int area_light_samples = 4;
-  /// Lights for which room is made at once: 5 bytes per patch and light. A frame that has more
-  /// makes the room it lacks, the only time that one allocates. At least 0.
+  /// Lights for which room is made at once. Each takes 4 bytes per patch, and 320 for each flat
+  /// piece of surface that hides light. A frame that has more makes the room it lacks, the only
+  /// time that one allocates. At least 0.
   int light_capacity = 16;
 };
 
@@ -71,10 +72,10 @@ class Engine {
 
   /// One frame: finds the direct irradiance of the patches under `lights` and `sky`, and with it
   /// all that follows. Lights are known by their number: keep their order, so that only those that
-  /// moved or changed shape are traced again. Throws Error if a field of a light that its type uses
-  /// is out of range, with the light's number, if a number of the sky is negative or not finite, or
-  /// if the sky has a distribution and the data do not say how much of its cells is seen. The last
-  /// frame then stays.
+  /// moved or changed shape are traced again. Throws Error if a field of a light that its type
+  /// uses, or its position, colour, intensity or range, is out of range, with the light's number,
+  /// if a number of the sky is negative or not finite, or if the sky has a distribution and the
+  /// data do not say how much of its cells is seen. The last frame then stays.
   void relight(std::span<const Light> lights, const Sky& sky);
 
   /// One frame with a direct irradiance [n] in lx that the caller brings, from shadow maps for

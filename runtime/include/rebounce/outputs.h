@@ -36,8 +36,8 @@ using SurfaceLight = std::array<Float3, kLinearHarmonicCount>;
 
 /// Writes the indirect irradiance in lx at the vertices [v], at least 0; 0 at those without
 /// weights. The weights keep the means of patches, for which some are negative: beside a bright
-/// patch a dark one would get less than nothing. Files made with --receivers-at vertices have rows
-/// of vertices, and what these add is part of it, here and in the lightmap. One thread at a time
+/// patch a dark one would get less than nothing. Where the file has rows of vertices
+/// (--receivers-at), what these add is part of it, here and in the lightmap. One thread at a time
 /// then.
 void vertex_irradiance(const Engine& engine, std::span<Float3> irradiance);
 

@@ -4,11 +4,11 @@
 
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
-#include <xxhash.h>
 
 #include <array>
 #include <cmath>
-#include <cstdio>
+#include <span>
+#include <string>
 
 #include "precompute/patches/winding.h"
 #include "rebounce/error.h"
@@ -16,29 +16,23 @@
 #include "runtime/python/core/lamps.h"
 #include "runtime/python/core/long_work.h"
 #include "runtime/python/core/module.h"
+#include "transfer/file/content_hash.h"
 
 namespace rebounce::python {
 namespace {
 
-/// XXH3 over the arrays of a scene, as files have it over theirs.
+/// Of the arrays of a scene, as files have it of theirs.
 std::string hash_of(const Scene& scene, const Array<float>& reflectance,
-                    const Array<float>& emission) {
-  XXH3_state_t* state = XXH3_createState();
-  XXH3_128bits_reset(state);
-  const auto add = [&](const void* bytes, std::size_t size) {
-    XXH3_128bits_update(state, bytes, size);
-  };
-  add(scene.position.data(), scene.position.size() * sizeof(Float3));
-  add(scene.triangle.data(), scene.triangle.size() * sizeof(Uint3));
-  add(reflectance.data(), static_cast<std::size_t>(reflectance.nbytes()));
-  add(emission.data(), static_cast<std::size_t>(emission.nbytes()));
-  const XXH128_hash_t hash = XXH3_128bits_digest(state);
-  XXH3_freeState(state);
-  std::array<char, 38> text{};
-  std::snprintf(text.data(), text.size(), "xxh3:%016llx%016llx",
-                static_cast<unsigned long long>(hash.high64),
-                static_cast<unsigned long long>(hash.low64));
-  return text.data();
+                    const Array<float>& emission, bool double_sided) {
+  ContentHash hash;
+  hash.update(std::as_bytes(std::span(scene.position)));
+  hash.update(std::as_bytes(std::span(scene.triangle)));
+  hash.update(std::as_bytes(std::span(scene.triangle_material)));
+  for (const auto* array : {&reflectance, &emission}) {
+    hash.update(std::as_bytes(std::span(array->data(), static_cast<std::size_t>(array->size()))));
+  }
+  hash.update(std::as_bytes(std::span(&double_sided, 1)));
+  return hash.text();
 }
 
 /// A scene of triangles [t] whose numbers are in order (the package looks): material k is the k-th
@@ -86,7 +80,7 @@ Scene make_scene(const Array<float>& vertices, const Array<std::uint32_t>& trian
     material.double_sided = double_sided;
     scene.materials.push_back(std::move(material));
   }
-  scene.hash = hash_of(scene, reflectance, emission);
+  scene.hash = hash_of(scene, reflectance, emission, double_sided);
   return scene;
 }
 

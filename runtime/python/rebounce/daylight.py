@@ -131,6 +131,10 @@ def read_weather(path: Path) -> Weather:
         if lines and lines[0].startswith("LOCATION"):
             head = lines[0].split(",")
             place, where = head[1], (float(head[6]), float(head[7]), float(head[8]))
+            number = 8
+            periods = lines[7].split(",")
+            if periods[0] == "DATA PERIODS" and int(periods[2]) != 1:
+                raise ValueError("only files with one record an hour are read")
             for number, line in enumerate(lines[8:], 9):
                 if not line.strip():
                     continue
@@ -172,7 +176,7 @@ def sun_position(weather: Weather) -> Floats:
     )  # fmt: skip
     equation_of_time = 229.18 / 60 * (
         0.000075 + 0.001868 * np.cos(angle) - 0.032077 * np.sin(angle)
-        - 0.014615 * np.cos(2 * angle) - 0.04089 * np.sin(2 * angle)
+        - 0.014615 * np.cos(2 * angle) - 0.040849 * np.sin(2 * angle)
     )  # fmt: skip
     solar_time = weather.hour + equation_of_time + weather.longitude / 15 - weather.time_zone
     turn = np.radians(15 * (solar_time - 12))

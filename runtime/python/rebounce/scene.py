@@ -30,7 +30,7 @@ class Scene:
 
     vertices: [v, 3] metres.
     triangles: [t, 3] indices of vertices, counter-clockwise seen from the front.
-    reflectance: in [0, 0.99], a number, [3], [t] or [t, 3].
+    reflectance: in [0, 0.99], a number, [3], [t] or [t, 3]. Of three triangles [3] is one colour.
     emission: luminance in cd/m² of the same shapes.
     ids: [t] a whole number for each triangle, that TransferData.patch_ids gives back by patch;
         triangles of different ids share no material. By default 0.

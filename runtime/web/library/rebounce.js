@@ -176,14 +176,20 @@ export class Engine {
 
   #makeRoom(count) {
     if (count <= this.#lights.capacity) return;
+    const address = this.#instance.allocate(4 * plainLightSize * count);
+    let chosen;
+    try {
+      chosen = this.#instance.allocate(count + 1);
+    } catch (error) {
+      this.#instance.release(address);
+      throw error;
+    }
     if (this.#lights.address) {
       this.#instance.release(this.#lights.address);
       this.#instance.release(this.#chosen);
     }
-    this.#lights = {
-      address: this.#instance.allocate(4 * plainLightSize * count), capacity: count,
-    };
-    this.#chosen = this.#instance.allocate(count + 1);
+    this.#lights = { address, capacity: count };
+    this.#chosen = chosen;
   }
 
   /** One frame: all that follows from `lights` and `sky`. */

@@ -447,6 +447,11 @@ TEST_F(PrecomputeCommand, WritesForPagesPackedFilesAndFormFactorsApart) {
     EXPECT_EQ(file.substr(0, 2), "\x1f\x8b");
   }
   EXPECT_LT(packed.size() + apart.size(), test::read_bytes(whole).size() * 3 / 4);
+  for (const Words& option : {Words{"--lightmap", "64"}, Words{"--store-form-factors"}}) {
+    Words words = {"precompute", kScene, "-o", path("x.safetensors"), "--for", "web"};
+    words.insert(words.end(), option.begin(), option.end());
+    expect_refused(words, "--for web leaves out what " + option.front() + " makes");
+  }
 }
 
 }  // namespace

@@ -350,6 +350,10 @@ TEST_F(GpuEngineTest, RefusesLampsItCannotLight) {
   lamp.depth_range = {1, 2};
   lamp.light.type = LightType::kDirectional;
   refused(lamp, "a cube around a directional light");
+  GpuLamp without_shadow;
+  const std::vector<GpuShadowView> unused(100);
+  without_shadow.views = unused;
+  EXPECT_NO_THROW(gpu.light_patches({&without_shadow, 1}, direct.name())) << "views do not count";
   test::expect_error([&] { gpu.light_patches({}, small.name()); }, "direct irradiance: its buffer");
   test::expect_error([&] { gpu.light_patches({}, direct.name(), small.name()); },
                      "light of others: its buffer");

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
 #include <random>
 
 #include "runtime/rays/ray_tracer.h"
@@ -57,6 +59,29 @@ TEST(Occluders, HolesStayOpen) {
   for (const Occluder& piece : occluders.piece) {
     EXPECT_FALSE(test::crosses(piece, {2.5F, 2.5F, -1}, {2.5F, 2.5F, 1}));
   }
+}
+
+/// A disc of `sides` triangles around the origin.
+TransferData disc(int sides) {
+  TransferData data;
+  const auto at = [&](int k) {
+    const float angle = 2 * std::numbers::pi_v<float> * static_cast<float>(k % sides) / sides;
+    return glm::vec3(std::cos(angle), std::sin(angle), 0);
+  };
+  for (int k = 0; k < sides; ++k) {
+    test::add_patch(data, {0, 0, 0}, at(k), at(k + 1), {0.5F, 0.5F, 0.5F});
+  }
+  return data;
+}
+
+TEST(Occluders, RoundSurfacesOfManySidesAreLeftToRays) {
+  const TransferData small = disc(100), large = disc(3000);
+  const Occluders whole = find_occluders(small.mesh, kAll, kAll);
+  EXPECT_TRUE(whole.is_whole);
+  EXPECT_NEAR(area(whole), area(small), 1e-4 * area(small));
+  const Occluders part = find_occluders(large.mesh, kAll, kAll);
+  EXPECT_FALSE(part.is_whole);
+  EXPECT_LE(area(part), 1.0001 * area(large));
 }
 
 TEST(Occluders, StopTheSameRaysAsTheTriangles) {

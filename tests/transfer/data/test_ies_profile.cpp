@@ -27,6 +27,19 @@ TEST(IesProfile, IsReadWithItsFactors) {
   EXPECT_EQ(profile->intensity(91 * kDegree, 0), 0);
 }
 
+TEST(IesProfile, TheBallastLampFactorCountsBefore1995) {
+  const auto straight_down = [](std::string text) {
+    const std::string from = "0.5 1 60";
+    text.replace(text.find(from), from.size(), "0.5 0.8 60");
+    return parse_ies_profile(text, "lamp.ies")->intensity(0, 0);
+  };
+  const std::string rest = kRound.substr(kRound.find('\n') + 1);
+  EXPECT_FLOAT_EQ(straight_down(kRound), 100);
+  EXPECT_FLOAT_EQ(straight_down("IES:LM-63-2019\n" + rest), 100);
+  EXPECT_FLOAT_EQ(straight_down("IESNA91\n" + rest), 80);
+  EXPECT_FLOAT_EQ(straight_down(rest), 80);  // 1986 has no such line
+}
+
 TEST(IesProfile, QuartersAreMirrored) {
   const auto profile = parse_ies_profile(kQuarters, "quarters.ies");
   const auto at = [&](float around) { return profile->intensity(0, around * kDegree); };

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "rebounce/error.h"
@@ -137,6 +138,11 @@ TEST(DenseOperator, RefusesStorageThatDoesNotFit) {
   EXPECT_THROW(DenseOperator{storage}, Error);
   storage = RandomOperator(100, 1, 1).storage;
   storage.channel_matrix[1] = 3;
+  EXPECT_THROW(DenseOperator{storage}, Error);
+  storage = RandomOperator(100, 1, 1).storage;
+  std::vector<float> tiles(storage.tiles_f32.begin(), storage.tiles_f32.end());
+  tiles[5] = std::numeric_limits<float>::infinity();
+  storage.tiles_f32 = SharedArray(std::move(tiles));
   EXPECT_THROW(DenseOperator{storage}, Error);
   const std::vector<float> huge(64 * 64, 100.0F);
   EXPECT_THROW(DenseOperator::encode_half(huge), Error);

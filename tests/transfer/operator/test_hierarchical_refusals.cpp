@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <functional>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -112,6 +114,19 @@ TEST(HierarchicalOperator, RefusesStorageThatDoesNotFit) {
            }},
           {"cannot be combined",
            [](Storage& s) { s.precision.couplings = CouplingPrecision::kF16; }},
+          {"a value is not finite",
+           [](Storage& s) {
+             std::vector<float> values(s.values_f32.begin(), s.values_f32.end());
+             values[7] = -std::numeric_limits<float>::infinity();
+             s.values_f32 = SharedArray(std::move(values));
+           }},
+          {"a value is not finite",
+           [](Storage& s) {
+             s = encode_values(s, Precision::kF16);
+             std::vector<std::uint16_t> values(s.values_f16.begin(), s.values_f16.end());
+             values[7] = 0x7E00;  // NaN
+             s.values_f16 = SharedArray(std::move(values));
+           }},
           {"number of values", [](Storage& s) { s.blocks.pop_back(); }},
           {"number of values", [](Storage& s) { s.order = HierarchicalStorage::Order::kStreamed; }},
           {"number of values",

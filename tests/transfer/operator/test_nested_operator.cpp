@@ -142,6 +142,34 @@ TEST(NestedOperator, ReceiversHaveTheLightOfClusterBasesThatBeginWithinARun) {
   }
 }
 
+TEST(NestedOperator, RefusesABlockOverAPartOfAClusterBasis) {
+  const auto storage_with = [](std::uint32_t row_begin, std::uint32_t row_count) {
+    HierarchicalStorage storage = storage_without_blocks(32);
+    storage.blocks = {{.row_begin = 0,
+                       .row_count = 32,
+                       .column_begin = 32,
+                       .column_count = 32,
+                       .kind = TransferBlock::Kind::kClusterBasis,
+                       .row_rank = 32},
+                      {.row_begin = row_begin,
+                       .row_count = row_count,
+                       .column_begin = 0,
+                       .column_count = 16,
+                       .kind = TransferBlock::Kind::kLowRank,
+                       .row_rank = 1,
+                       .column_rank = 1}};
+    storage.coefficient_scale.assign(32, 1.0F);
+    storage.values_f32 = SharedArray(
+        std::vector<float>(32 * 32 + row_count + 16 + 1 + HierarchicalFormat::kPadding, 1.0F));
+    return storage;
+  };
+  EXPECT_NO_THROW(HierarchicalOperator(storage_with(32, 32)));
+  for (const std::uint32_t begin : {32U, 48U}) {
+    expect_error([&] { HierarchicalOperator(storage_with(begin, 16)); },
+                 "within the coefficients of a cluster basis");
+  }
+}
+
 std::vector<float> expansion(const HierarchicalOperator& op) {
   std::vector<float> y(op.patch_count() * op.patch_count());
   op.expand(0, y);

@@ -100,7 +100,6 @@ TEST(FormFactorKernel, IsReciprocalAndNeverNegative) {
     const double ab = unoccluded_exchange_area(a, b), ba = unoccluded_exchange_area(b, a);
     ASSERT_GE(ab, 0);
     ASSERT_NEAR(ab, ba, 1e-4 * ab + kQuadratureError);
-    ASSERT_EQ(ab > 0, can_exchange(a, b) && ab > 0);
     (ab > 0 ? seen : hidden) += 1;
   }
   EXPECT_GT(seen, 1000);
