@@ -4,6 +4,7 @@
 #include <tiny_gltf.h>
 
 #include <cctype>
+#include <string_view>
 
 #include "precompute/import/gltf_container.h"
 #include "rebounce/error.h"
