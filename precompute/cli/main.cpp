@@ -74,6 +74,8 @@ int run(int argc, char** argv) {
   return 0;
 }
 
+const std::terminate_handler usual_handler = std::get_terminate();
+
 /// For what nobody can catch, because it leaves a parallel region: memory that ran out there.
 [[noreturn]] void report_and_exit() {
   try {
@@ -85,6 +87,7 @@ int run(int argc, char** argv) {
     std::_Exit(kBadInput);
   } catch (...) {
   }
+  usual_handler();
   std::abort();
 }
 

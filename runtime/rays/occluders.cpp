@@ -16,8 +16,9 @@ namespace {
 
 using Outline = std::vector<glm::dvec2>;  // counter-clockwise
 
-// Cuts of one plane. A round outline of n sides takes n cuts, and time that grows with n³.
-constexpr int kMostCuts = 512;
+// Pairs of a side and a corner that are compared for one plane, some 50 ms. A round outline of n
+// sides compares n³ / 6.
+constexpr std::size_t kMostCompared = std::size_t{1} << 22U;
 
 struct Side {
   glm::dvec2 from, to;  // what it bounds is on its left
@@ -56,19 +57,20 @@ class ConvexPieces {
 
   std::vector<Outline> take() { return std::move(piece_); }
 
-  /// False if the pieces do not cover the surface, because it would take more than kMostCuts.
-  bool is_whole() const { return cuts_ <= kMostCuts; }
+  /// False if the pieces do not cover the surface, because it would take too long.
+  bool is_whole() const { return compared_ <= kMostCompared; }
 
  private:
   /// `side`: those that may pass through `cell`.
   void cut(Outline cell, std::vector<Side> side) {
-    if (cell.size() < 3 || !is_whole()) return;
+    if (cell.size() < 3) return;
+    compared_ += cell.size() * side.size();
+    if (!is_whole()) return;
     std::erase_if(side, [&](const Side& s) { return is_on_border(cell, s); });
     if (side.empty()) {
       if (is_inside(cell)) piece_.push_back(std::move(cell));
       return;
     }
-    if (++cuts_ > kMostCuts) return;
     const Side line = *std::ranges::max_element(side, {}, &Side::length);
     for (const bool left : {true, false}) {
       std::vector<Side> part;
@@ -129,7 +131,7 @@ class ConvexPieces {
 
   std::span<const Side> side_;
   double tolerance_;
-  int cuts_ = 0;
+  std::size_t compared_ = 0;
   std::vector<Outline> piece_;
 };
 

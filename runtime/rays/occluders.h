@@ -21,7 +21,7 @@ struct Occluder {
 
 struct Occluders {
   std::vector<Occluder> piece;
-  bool is_whole = true;  ///< false: only some of the largest pieces of the surface
+  bool is_whole = true;  ///< false: only a part of the surface
 };
 
 /// The surface that `mesh` traces rays against (its first surface_count() triangles), cut into

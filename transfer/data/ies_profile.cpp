@@ -22,8 +22,10 @@ class IesReader {
   IesReader(std::string_view text, const std::string& name) : rest_(text), name_(name) {}
 
   std::shared_ptr<const IntensityProfile> read() {
-    // From 1995 on the first line names the year, and the ballast-lamp factor is 1 or no factor.
-    const bool is_old = !rest_.starts_with("IESNA:LM-63-") && !rest_.starts_with("IES:LM-63-");
+    // From 1995 on the head names the year, and the ballast-lamp factor is 1 or no factor.
+    const std::string_view head = rest_.substr(0, rest_.find("TILT="));
+    const bool is_old = head.find("IESNA:LM-63-") == std::string_view::npos &&
+                        head.find("IES:LM-63-") == std::string_view::npos;
     skip_to_tilt();
     number("number of lamps");
     number("lumens per lamp");

@@ -12,9 +12,9 @@ namespace {
 
 using nlohmann::json;
 
-// At the end of an object the parser looks at all entries of what the object is in. More looks than
-// this take seconds.
-constexpr std::size_t kMostLooks = std::size_t{1} << 28U;
+// At the end of an object the parser looks at all entries of what the object is in. So many take
+// some tenths of a second.
+constexpr std::size_t kMostLooks = std::size_t{1} << 26U;
 
 /// Checks the depth of a parse, the keys of each open object, and the work of the parser.
 class Watch {

@@ -32,6 +32,7 @@ FormFactorSettings with_more_probes(FormFactorSettings settings) {
 
 /// Rays that leave each patch beside the first ones, so that what its coarse links exchange is
 /// known as well as what other links do.
+///
 /// `rays` [n] are those that have left the patches, of which `first_rays` are the first.
 std::vector<double> further_rays(const LeafLinks& links, const CountedExchange& counted,
                                  double epsilon, std::span<const double> rays, int first_rays) {

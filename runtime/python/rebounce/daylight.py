@@ -132,7 +132,7 @@ def read_weather(path: Path) -> Weather:
             head = lines[0].split(",")
             place, where = head[1], (float(head[6]), float(head[7]), float(head[8]))
             number = 8
-            periods = lines[7].split(",")
+            periods = lines[7].split(",") if len(lines) > 7 else [""]
             if periods[0] == "DATA PERIODS" and int(periods[2]) != 1:
                 raise ValueError("only files with one record an hour are read")
             for number, line in enumerate(lines[8:], 9):

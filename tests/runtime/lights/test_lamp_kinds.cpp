@@ -9,6 +9,7 @@
 #include <set>
 #include <string>
 
+#include "runtime/lights/lamp_geometry.h"
 #include "runtime/lights/lamp_kind.h"
 #include "runtime/lights/light_sampling.h"
 #include "runtime/rays/float3_glm.h"
@@ -17,6 +18,16 @@
 
 namespace rebounce::test_lamp_kinds {
 namespace {
+
+TEST(LampGeometry, ATangentAlongTheAxisStillGivesSides) {
+  for (const glm::vec3& axis : {glm::vec3(1, 0, 0), glm::vec3(0, -1, 0), glm::vec3(0, 0, 1)}) {
+    const auto [side, other_side] = sides_around(axis, 3.0F * axis);
+    EXPECT_NEAR(glm::length(side), 1, 1e-6);
+    EXPECT_NEAR(glm::length(other_side), 1, 1e-6);
+    EXPECT_NEAR(glm::dot(side, axis), 0, 1e-6);
+    EXPECT_NEAR(glm::dot(side, other_side), 0, 1e-6);
+  }
+}
 
 /// A lamp of the kind whose fields are as they should be.
 Light good_lamp(const LampKind& kind) {

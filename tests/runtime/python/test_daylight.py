@@ -37,6 +37,9 @@ def test_weather_files(tmp_path):
     epw.write_text(EPW_HEAD + "2020,1,1,x\n")
     with pytest.raises(ValueError, match="line 9"):
         daylight.read_weather(epw)
+    epw.write_text(EPW_HEAD[: -len("HEAD\n")] + "DATA PERIODS,1,4,Data,Sunday,1/1,12/31\n" + epw_line(1, 1, 1, 0, 0))
+    with pytest.raises(ValueError, match="a.epw, line 8: only files with one record an hour"):
+        daylight.read_weather(epw)
     epw.write_text(EPW_HEAD + epw_line(13, 1, 1, 0, 0))
     with pytest.raises(ValueError, match="a.epw, line 9: there is no month 13"):
         daylight.read_weather(epw)

@@ -29,9 +29,10 @@ struct IntensityProfile {
 };
 
 /// Reads the photometric data of a luminaire from the text of an IES file (ANSI/IES LM-63-1986 to
-/// -2019, type C photometry), with its multiplier and ballast factor; keywords and the lamp's shape
-/// are skipped. `name` stands for the file in messages. Throws Error if the text is no such file,
-/// is of type A or B, or has angles that are not those of a type C measurement.
+/// -2019, type C photometry), with its multiplier, its ballast factor and, before 1995, its
+/// ballast-lamp factor; keywords and the lamp's shape are skipped. `name` stands for the file in
+/// messages. Throws Error if the text is no such file, is of type A or B, or has angles that are
+/// not those of a type C measurement.
 std::shared_ptr<const IntensityProfile> parse_ies_profile(std::string_view text,
                                                           const std::string& name);
 
