@@ -70,7 +70,7 @@ ROOMS = {
     "bench/report": "Everything that ./dev report shows.",
     "bench/truth": "The offline stage and the runtime against the path tracer.",
     "tests/fuzz": "Hostile input for what reads files and for the C interface.",
-    "tests": "A folder for each room of the libraries; files of every format in golden.",
+    "tests": "A folder for each room of the libraries.",
 }
 ROOM_ORDER = {room: place for place, room in enumerate(ROOMS)}
 
