@@ -74,7 +74,7 @@ int run(int argc, char** argv) {
   return 0;
 }
 
-const std::terminate_handler usual_handler = std::get_terminate();
+const std::terminate_handler kUsualHandler = std::get_terminate();
 
 /// For what nobody can catch, because it leaves a parallel region: memory that ran out there.
 [[noreturn]] void report_and_exit() {
@@ -87,7 +87,7 @@ const std::terminate_handler usual_handler = std::get_terminate();
     std::_Exit(kBadInput);
   } catch (...) {
   }
-  usual_handler();
+  kUsualHandler();
   std::abort();
 }
 
