@@ -37,6 +37,13 @@ std::vector<std::uint32_t> with_role(std::span<const std::uint32_t> patches,
 
 }  // namespace
 
+std::vector<MatrixXf> SymmetricMatrix::all_entries(std::span<const std::uint32_t> rows,
+                                                   std::span<const std::uint32_t> columns) const {
+  std::vector<MatrixXf> all(matrix_count(), MatrixXf(rows.size(), columns.size()));
+  for (std::uint32_t m = 0; m < matrix_count(); ++m) entries(m, rows, columns, all[m]);
+  return all;
+}
+
 Eigen::VectorXd SymmetricMatrix::energies(std::span<const std::uint32_t> order) const {
   load_blas();
   const auto sources = with_role(order, roles_, PatchRoles::kSource);

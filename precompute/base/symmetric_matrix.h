@@ -37,6 +37,10 @@ class SymmetricMatrix {
                        std::span<const std::uint32_t> columns,
                        Eigen::Ref<Eigen::MatrixXf> entries) const = 0;
 
+  /// The entries of each of the matrices.
+  virtual std::vector<Eigen::MatrixXf> all_entries(std::span<const std::uint32_t> rows,
+                                                   std::span<const std::uint32_t> columns) const;
+
   /// The product with many vectors at once, x [n][k]. The bits do not depend on the number of
   /// threads.
   virtual Eigen::MatrixXf multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const = 0;

@@ -14,9 +14,13 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
+using Eigen::MatrixXf;
 
 // Columns of a sketch beyond the wanted rank; Halko et al. advise 5 to 10.
 constexpr Index kOversampling = 8;
+
+// The difference of two energies of single precision is sure if it is more than this part of them.
+constexpr double kSureDifference = 1e-4;
 
 // In a block with more rows than this, ranks above a quarter of the rows are not tried.
 constexpr Index kLargeBlock = 128;
@@ -27,12 +31,12 @@ struct Spectrum {
   std::vector<double> missing;  ///< [k] energy of the whole minus that of the first k
 };
 
-/// Makes a spectrum from eigenvectors in ascending order; `lost` is the energy outside their span.
-Spectrum descending(MatrixXd vectors, const Eigen::VectorXd& energies, double lost) {
+/// Makes a spectrum from eigenvectors in ascending order.
+Spectrum descending(const MatrixXd& vectors, const Eigen::VectorXd& energies) {
   Spectrum spectrum;
   const Index count = energies.size();
   spectrum.directions = vectors.rowwise().reverse();
-  spectrum.missing.assign(static_cast<std::size_t>(count) + 1, lost);
+  spectrum.missing.assign(static_cast<std::size_t>(count) + 1, 0);
   for (Index k = count; k-- > 0;) {
     spectrum.missing[k] = spectrum.missing[k + 1] + std::max(0.0, energies[count - 1 - k]);
   }
@@ -43,26 +47,50 @@ Spectrum gram_spectrum(const MatrixXd& a) {
   MatrixXd gram = MatrixXd::Zero(a.rows(), a.rows());
   gram.selfadjointView<Eigen::Lower>().rankUpdate(a);
   const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(gram);
-  return descending(solver.eigenvectors(), solver.eigenvalues(), 0);
+  return descending(solver.eigenvectors(), solver.eigenvalues());
 }
 
-Spectrum sketched_spectrum(const MatrixXd& a, Index sketch_size, std::uint64_t seed) {
-  const MatrixXd sample = a * random_signs(a.cols(), sketch_size, seed);
-  const MatrixXd range = Eigen::HouseholderQR<MatrixXd>(sample).householderQ() *
-                         MatrixXd::Identity(a.rows(), sketch_size);
-  const MatrixXd projected = range.transpose() * a;
-  Spectrum inner = gram_spectrum(projected);
-  const double lost = std::max(0.0, a.squaredNorm() - projected.squaredNorm());
-  for (double& missing : inner.missing) missing += lost;
-  inner.directions = range * inner.directions;
-  return inner;
-}
+/// The leading left singular vectors of a block.
+class RowSpectrum : public Spectrum {
+ public:
+  /// No more than `largest_rank` are wanted.
+  RowSpectrum(const WideBlock& block, Index largest_rank, std::uint64_t seed) {
+    const Index sketch_size = largest_rank + kOversampling;
+    if (2 * sketch_size < block.rows()) {
+      sketch(block, sketch_size, seed);
+    } else {
+      in_range_ = block.entries.cast<double>();
+      static_cast<Spectrum&>(*this) = gram_spectrum(in_range_);
+      in_range_directions_ = directions;
+    }
+  }
 
-/// Leading left singular vectors of `a`; no more than `largest_rank` are wanted.
-Spectrum left_spectrum(const MatrixXd& a, Index largest_rank, std::uint64_t seed) {
-  const Index sketch_size = largest_rank + kOversampling;
-  return 2 * sketch_size < a.rows() ? sketched_spectrum(a, sketch_size, seed) : gram_spectrum(a);
-}
+  /// The block in the first `rank` directions, [rank][matrices x columns].
+  MatrixXd project(Index rank) const {
+    return in_range_directions_.leftCols(rank).transpose() * in_range_;
+  }
+
+ private:
+  void sketch(const WideBlock& block, Index size, std::uint64_t seed) {
+    const MatrixXf& whole = block.entries;
+    const MatrixXf sample = whole * random_signs(whole.cols(), size, seed);
+    const MatrixXd range = Eigen::HouseholderQR<MatrixXd>(sample.cast<double>()).householderQ() *
+                           MatrixXd::Identity(whole.rows(), size);
+    const MatrixXf rounded = range.cast<float>();
+    const MatrixXf kept = rounded.transpose() * whole;
+    in_range_ = kept.cast<double>();
+    static_cast<Spectrum&>(*this) = gram_spectrum(in_range_);
+    const double energy = block.squared_norm();
+    double lost = energy - in_range_.squaredNorm();
+    if (lost < kSureDifference * energy) lost = WideBlock::energy_of(whole - rounded * kept);
+    for (double& energy_missing : missing) energy_missing += lost;
+    in_range_directions_ = std::move(directions);
+    directions = range * in_range_directions_;
+  }
+
+  MatrixXd in_range_;             ///< the block in the basis of its range, [range][columns]
+  MatrixXd in_range_directions_;  ///< the directions in that basis
+};
 
 /// Exact right singular vectors of `a`.
 Spectrum right_spectrum(const MatrixXd& a) {
@@ -137,7 +165,7 @@ double least_cost_beyond(const WideBlock& block, const Spectrum& rows, Index see
   return least;
 }
 
-void truncate_diagonal(const WideBlock& block, const Spectrum& rows, Index largest,
+void truncate_diagonal(const WideBlock& block, const RowSpectrum& rows, Index largest,
                        const CompressionCost& cost, LowRankBlock& result) {
   const Index m = block.rows(), matrices = block.matrix_count;
   // Energy that is missing from the rows is missing from the columns too.
@@ -145,14 +173,15 @@ void truncate_diagonal(const WideBlock& block, const Spectrum& rows, Index large
                                    [&](Index k) { return cost.size(m * k, k, matrices * k * k); });
   result.row_basis = rows.directions.leftCols(rank);
   double kept = 0;
+  const MatrixXd projected = rows.project(rank);
   for (Index c = 0; c < matrices; ++c) {
-    result.couplings.push_back(result.row_basis.transpose() * block.matrix(c) * result.row_basis);
+    result.couplings.push_back(projected.middleCols(c * m, m) * result.row_basis);
     kept += result.couplings.back().squaredNorm();
   }
-  result.error_squared = std::max(0.0, block.entries.squaredNorm() - kept);
+  result.error_squared = rows.missing[rank] + std::max(0.0, projected.squaredNorm() - kept);
 }
 
-void truncate(const WideBlock& block, const Spectrum& rows, Index largest,
+void truncate(const WideBlock& block, const RowSpectrum& rows, Index largest,
               const CompressionCost& cost, LowRankBlock& result) {
   const Index m = block.rows(), n = block.columns(), matrices = block.matrix_count;
   // Half of the size of a coupling matrix counts for the rows, half for the columns.
@@ -160,9 +189,10 @@ void truncate(const WideBlock& block, const Spectrum& rows, Index largest,
       rows, largest, cost, 1, [&](Index k) { return cost.size(m * k, k, matrices * k * k / 2); });
   result.row_basis = rows.directions.leftCols(row_rank);
   result.error_squared = rows.missing[row_rank];
+  const MatrixXd wide = rows.project(row_rank);
   MatrixXd projected(matrices * row_rank, n);
   for (Index c = 0; c < matrices; ++c) {
-    projected.middleRows(c * row_rank, row_rank) = result.row_basis.transpose() * block.matrix(c);
+    projected.middleRows(c * row_rank, row_rank) = wide.middleCols(c * n, n);
   }
   Index column_rank = 0;
   if (row_rank > 0) {
@@ -185,7 +215,7 @@ void truncate(const WideBlock& block, const Spectrum& rows, Index largest,
 BlockAttempt compress_block(const WideBlock& block, const CompressionCost& cost, double limit,
                             Index largest_rank, std::uint64_t seed) {
   const Index largest = std::min(largest_rank, largest_worthwhile_rank(block, cost, limit));
-  const Spectrum rows = left_spectrum(block.entries, largest, seed);
+  const RowSpectrum rows(block, largest, seed);
   LowRankBlock result;
   result.on_diagonal = block.on_diagonal;
   if (block.on_diagonal) {

@@ -22,11 +22,11 @@ constexpr std::uint32_t kLargestPiece = 2048, kSmallestPiece = 512;
 // only store the same few functions several times (lab/052).
 constexpr Index kSmoothPart = 16;
 
-void append_columns(const Eigen::MatrixXd& matrix, std::vector<float>& values) {
-  for (Index k = 0; k < matrix.size(); ++k) values.push_back(static_cast<float>(matrix.data()[k]));
+void append_columns(const Eigen::MatrixXf& matrix, std::vector<float>& values) {
+  values.insert(values.end(), matrix.data(), matrix.data() + matrix.size());
 }
 
-void append_rows(const Eigen::MatrixXd& matrix, std::vector<float>& values) {
+void append_rows(const Eigen::MatrixXf& matrix, std::vector<float>& values) {
   append_columns(matrix.transpose(), values);
 }
 
@@ -57,21 +57,24 @@ class PieceCompressor {
         column_(piece.column),
         row_begin_(tree.clusters[piece.row].begin),
         column_begin_(tree.clusters[piece.column].begin) {
-    for (std::uint32_t m = 0; m < matrix.matrix_count(); ++m) gather(matrix, m);
+    gather(matrix);
   }
 
   BlockPart compress() const { return compress(row_, column_); }
 
  private:
-  void gather(const SymmetricMatrix& matrix, std::uint32_t m) {
+  void gather(const SymmetricMatrix& matrix) {
     const Cluster &row = tree_.clusters[row_], &column = tree_.clusters[column_];
     const auto rows = patches_of(tree_, row), columns = patches_of(tree_, column);
-    Eigen::MatrixXf& entries =
-        matrices_.emplace_back(Eigen::MatrixXf::Zero(row.count, column.count));
-    auto held =
-        entries.topLeftCorner(static_cast<Index>(rows.size()), static_cast<Index>(columns.size()));
-    matrix.entries(m, rows, columns, held);
-    wanted_.clear_unwanted(rows, columns, held);
+    matrices_ = matrix.all_entries(rows, columns);
+    for (Eigen::MatrixXf& entries : matrices_) {
+      wanted_.clear_unwanted(rows, columns, entries);
+      // Positions at the end of a cluster may hold no patch.
+      if (entries.rows() == row.count && entries.cols() == column.count) continue;
+      Eigen::MatrixXf padded = Eigen::MatrixXf::Zero(row.count, column.count);
+      padded.topLeftCorner(entries.rows(), entries.cols()) = entries;
+      entries = std::move(padded);
+    }
   }
 
   Index matrix_count() const { return static_cast<Index>(matrices_.size()); }
@@ -83,10 +86,8 @@ class PieceCompressor {
     block.entries.resize(place.row_count, matrix_count() * place.column_count);
     for (Index m = 0; m < matrix_count(); ++m) {
       block.entries.middleCols(m * place.column_count, place.column_count) =
-          matrices_[m]
-              .block(place.row_begin - row_begin_, place.column_begin - column_begin_,
-                     place.row_count, place.column_count)
-              .cast<double>();
+          matrices_[m].block(place.row_begin - row_begin_, place.column_begin - column_begin_,
+                             place.row_count, place.column_count);
     }
     return block;
   }
@@ -120,7 +121,7 @@ class PieceCompressor {
     const WideBlock block = weighted_block(place, row, column);
     const CompressionCost cost{
         .multiplier = multiplier_, .multiplicity = multiplicity(row, column), .sizes = sizes_};
-    const double zero_cost = cost.total(block.entries.squaredNorm(), sizes_.block);
+    const double zero_cost = cost.total(block.squared_norm(), sizes_.block);
     const double overhead = multiplier_ * sizes_.block;
     if (zero_cost <= 2 * overhead) return zero_part(place, zero_cost);
     const std::uint64_t seed = (std::uint64_t{rows.begin} << 32) + columns.begin + rows.count;
@@ -207,9 +208,10 @@ class PieceCompressor {
     place.row_residual_rank = static_cast<std::uint32_t>(ranks.row);
     place.column_residual_rank = static_cast<std::uint32_t>(ranks.column);
     BlockPart part{{place}, {}, 0};
-    append_columns(block.row_basis, part.values);
-    append_columns(block.column_basis, part.values);
-    for (const Eigen::MatrixXd& coupling : block.couplings) append_rows(coupling, part.values);
+    append_columns(block.row_basis.cast<float>(), part.values);
+    append_columns(block.column_basis.cast<float>(), part.values);
+    for (const Eigen::MatrixXd& coupling : block.couplings)
+      append_rows(coupling.cast<float>(), part.values);
     part.cost = cost.of(block) + multiplier_ * sizes_.block;
     return part;
   }

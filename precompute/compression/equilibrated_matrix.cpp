@@ -18,6 +18,19 @@ void EquilibratedMatrix::entries(std::uint32_t matrix, std::span<const std::uint
                                  std::span<const std::uint32_t> columns,
                                  Eigen::Ref<Eigen::MatrixXf> entries) const {
   matrix_.entries(matrix, rows, columns, entries);
+  equilibrate(rows, columns, entries);
+}
+
+std::vector<Eigen::MatrixXf> EquilibratedMatrix::all_entries(
+    std::span<const std::uint32_t> rows, std::span<const std::uint32_t> columns) const {
+  std::vector<Eigen::MatrixXf> all = matrix_.all_entries(rows, columns);
+  for (Eigen::MatrixXf& entries : all) equilibrate(rows, columns, entries);
+  return all;
+}
+
+void EquilibratedMatrix::equilibrate(std::span<const std::uint32_t> rows,
+                                     std::span<const std::uint32_t> columns,
+                                     Eigen::Ref<Eigen::MatrixXf> entries) const {
   for (std::size_t j = 0; j < columns.size(); ++j) {
     const float of_column = inverse_[columns[j]];
     for (std::size_t i = 0; i < rows.size(); ++i) {

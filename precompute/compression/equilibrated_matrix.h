@@ -26,9 +26,14 @@ class EquilibratedMatrix final : public SymmetricMatrix {
   void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
                std::span<const std::uint32_t> columns,
                Eigen::Ref<Eigen::MatrixXf> entries) const override;
+  std::vector<Eigen::MatrixXf> all_entries(std::span<const std::uint32_t> rows,
+                                           std::span<const std::uint32_t> columns) const override;
   Eigen::MatrixXf multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const override;
 
  private:
+  void equilibrate(std::span<const std::uint32_t> rows, std::span<const std::uint32_t> columns,
+                   Eigen::Ref<Eigen::MatrixXf> entries) const;
+
   const SymmetricMatrix& matrix_;
   Eigen::VectorXf inverse_;  ///< [n] inverse of R
 };

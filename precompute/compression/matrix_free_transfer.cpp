@@ -28,7 +28,7 @@ namespace {
 constexpr double kResidualPart = 0.35;  // lab/060: a smaller one changes no error
 
 // The tolerance of the form factors that the steps multiply with, in tolerances of the operator.
-constexpr double kCoarsePart = 4;  // lab/060: half of the time of all form factors
+constexpr double kCoarsePart = 8;  // lab/149
 
 // The error that bases may leave, in tolerances of the operator.
 constexpr double kBasisPart = 0.3;  // lab/132

@@ -206,7 +206,8 @@ class BasisSampler {
 
   /// Random light of a cell, as strong as its weight, [positions of the cluster][k].
   MatrixXd random_light(const Cell& cell, std::uint64_t seed) const {
-    MatrixXd light = random_signs(cell.cluster.count, kGroupSamples, seed + cell.cluster.begin);
+    MatrixXd light =
+        random_signs(cell.cluster.count, kGroupSamples, seed + cell.cluster.begin).cast<double>();
     for (Index k = 0; k < cell.patch_count(); ++k) {
       if (!has_role(cell.patches[k])) light.row(k).setZero();
     }

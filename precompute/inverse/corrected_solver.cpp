@@ -81,11 +81,11 @@ Lights CorrectedSolver::gather(const Lights& radiosities) const {
 }
 
 Lights CorrectedSolver::indirect_irradiances(std::span<const std::vector<Float3>> initial_exitances,
-                                             double residual) const {
+                                             const Accuracy& accuracy) const {
   Lights result = nearly_exact(initial_exitances);
   std::vector<Open> open;
   for (std::size_t k = 0; k < result.size(); ++k) {
-    open.push_back({k, area_norm(result[k], patches_.area)});
+    open.push_back({k, area_norm(result[k], patches_.area), 0});
   }
   for (int round = 0; round < kMostRounds && !open.empty(); ++round) {
     const Lights corrected = correct(initial_exitances, result, open);
@@ -95,13 +95,17 @@ Lights CorrectedSolver::indirect_irradiances(std::span<const std::vector<Float3>
       add_to(light, corrected[k], -1);
       const double change = area_norm(light, patches_.area);
       light = corrected[k];
+      const double guess_error = round == 0 ? change : open[k].guess_error;
+      const double allowed = std::max(accuracy.of_light * area_norm(light, patches_.area),
+                                      accuracy.of_guess * guess_error);
       // What is left is the same part of this change as it is of the last one.
-      const double allowed = residual * area_norm(light, patches_.area);
-      if (change * change > allowed * open[k].last_change) left.push_back({open[k].light, change});
+      if (change * change > allowed * open[k].last_change) {
+        left.push_back({open[k].light, change, guess_error});
+      }
     }
     open = std::move(left);
   }
-  solve_along_links(initial_exitances, open, residual, result);
+  solve_along_links(initial_exitances, open, accuracy.of_light, result);
   return result;
 }
 

@@ -28,11 +28,16 @@ class CorrectedSolver {
                   const PatchTable& patches,
                   std::shared_ptr<const TransferOperator> nearly_inverse = {});
 
-  /// The indirect irradiances of `initial_exitances` by the links, in lx, off by at most `residual`
-  /// of themselves, as the last correction lets expect; gathers in single precision. All ranks call
-  /// it together. The bits do not depend on threads or ranks.
+  /// How far light may be off, as the last correction lets expect. The larger of two limits holds.
+  struct Accuracy {
+    double of_light;      ///< relative to the light
+    double of_guess = 0;  ///< relative to the error of its guess
+  };
+
+  /// The indirect irradiances of `initial_exitances` by the links, in lx; gathers in single
+  /// precision. All ranks call it together. The bits do not depend on threads or ranks.
   Lights indirect_irradiances(std::span<const std::vector<Float3>> initial_exitances,
-                              double residual) const;
+                              const Accuracy& accuracy) const;
 
   /// The same, off by what guesses are.
   Lights nearly_exact(std::span<const std::vector<Float3>> initial_exitances) const;
@@ -42,6 +47,7 @@ class CorrectedSolver {
   struct Open {
     std::size_t light;   ///< its place among all
     double last_change;  ///< area norm of what the last round has changed
+    double guess_error;  ///< area norm of what the first round has changed
   };
 
   Lights gather(const Lights& radiosities) const;

@@ -43,6 +43,12 @@ void find_lit(const Vectors& x, std::vector<std::uint32_t>& lit_before) {
   }
 }
 
+/// Makes room for `rows`. Matrices of several sizes share a workspace, so rows are never given
+/// back.
+void grow(Vectors& vectors, Index rows, Index width) {
+  if (vectors.rows() < rows || vectors.cols() != width) vectors.resize(rows, width);
+}
+
 }  // namespace
 
 struct HierarchicalMatrix::Places {
@@ -210,8 +216,8 @@ void HierarchicalMatrix::add_block(std::uint32_t matrix, std::size_t index, cons
 void HierarchicalMatrix::multiply(std::uint32_t matrix, const Vectors& x, Vectors& y,
                                   Workspace& workspace) const {
   const Index width = x.cols();
-  workspace.sent.resize(low_rank_count_, width);
-  workspace.received.resize(low_rank_count_, width);
+  grow(workspace.sent, low_rank_count_, width);
+  grow(workspace.received, low_rank_count_, width);
   find_lit(x, workspace.lit_before);
   y.setZero(x.rows(), width);
   for (const HierarchicalLayout::Cluster& cluster : layout_.clusters) {
@@ -246,10 +252,25 @@ HierarchicalMatrix::Side HierarchicalMatrix::side_of(const TransferBlock& block,
   return {begin, count, end.coefficient, row ? block.row_rank : block.column_rank, end.cluster};
 }
 
+/// Finds the clusters that a coupling matrix brings light to.
+void HierarchicalMatrix::find_reached(Workspace& workspace) const {
+  workspace.reached.assign(layout_.clusters.size(), 0);
+  for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
+    const TransferBlock& block = storage_.blocks[b];
+    if (block.kind == TransferBlock::Kind::kDense || !has_values(block)) continue;
+    const auto pass = [&](const Side& source, const Side& target) {
+      if (workspace.is_lit(source.begin, source.count)) workspace.reached[target.cluster] = 1;
+    };
+    const Side row = side_of(block, b, true), column = side_of(block, b, false);
+    pass(column, row);
+    if (!block.on_diagonal()) pass(row, column);
+  }
+}
+
 /// Multiplies with the coupling matrices, and with all of the dense blocks.
 void HierarchicalMatrix::multiply_blocks(std::uint32_t matrix, const Vectors& x, Vectors& y,
                                          Workspace& workspace) const {
-  workspace.reached.assign(layout_.clusters.size(), 0);
+  find_reached(workspace);
   for (std::size_t b = 0; b < storage_.blocks.size(); ++b) {
     const TransferBlock& block = storage_.blocks[b];
     if (!has_values(block)) continue;
@@ -263,8 +284,7 @@ void HierarchicalMatrix::multiply_blocks(std::uint32_t matrix, const Vectors& x,
       if (workspace.is_lit(source.begin, source.count)) {
         product(transposed, target.size, source.size, entries, from.row(source.first).data(),
                 to.row(target.first).data(), x.cols(), dense ? Write::kAdd : Write::kSet);
-        if (!dense) workspace.reached[target.cluster] = 1;
-      } else if (!dense) {
+      } else if (!dense && workspace.reached[target.cluster] != 0) {
         to.middleRows(target.first, target.size).setZero();
       }
     };

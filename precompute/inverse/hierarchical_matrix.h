@@ -65,6 +65,7 @@ class HierarchicalMatrix final : public SymmetricMatrix {
                                 std::span<const Place> rows, std::span<const Place> columns) const;
   void add_block(std::uint32_t matrix, std::size_t block, const Places& rows, const Places& columns,
                  Eigen::Ref<Eigen::MatrixXf> entries) const;
+  void find_reached(Workspace& workspace) const;
   void multiply_blocks(std::uint32_t matrix, const Vectors& x, Vectors& y,
                        Workspace& workspace) const;
   /// One side of a block: its positions, its coefficients, and the cluster of its basis.

@@ -51,14 +51,29 @@ void SolvedMatrix::add_later_bounces(std::uint32_t matrix, const Run& row, const
   part.noalias() += row.vectors * right;
 }
 
-void SolvedMatrix::entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
-                           std::span<const std::uint32_t> columns,
-                           Eigen::Ref<MatrixXf> entries) const {
-  solved_.form_factors().entries(0, rows, columns, entries);
+void SolvedMatrix::add_later_bounces(std::uint32_t matrix, std::span<const std::uint32_t> rows,
+                                     std::span<const std::uint32_t> columns,
+                                     Eigen::Ref<MatrixXf> entries) const {
   const std::vector<Run> row_runs = runs_of(matrix, rows), column_runs = runs_of(matrix, columns);
   for (const Run& column : column_runs) {
     for (const Run& row : row_runs) add_later_bounces(matrix, row, column, entries);
   }
+}
+
+void SolvedMatrix::entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
+                           std::span<const std::uint32_t> columns,
+                           Eigen::Ref<MatrixXf> entries) const {
+  solved_.form_factors().entries(0, rows, columns, entries);
+  add_later_bounces(matrix, rows, columns, entries);
+}
+
+std::vector<MatrixXf> SolvedMatrix::all_entries(std::span<const std::uint32_t> rows,
+                                                std::span<const std::uint32_t> columns) const {
+  MatrixXf first_bounce(rows.size(), columns.size());
+  solved_.form_factors().entries(0, rows, columns, first_bounce);
+  std::vector<MatrixXf> all(matrix_count(), first_bounce);
+  for (std::uint32_t m = 0; m < matrix_count(); ++m) add_later_bounces(m, rows, columns, all[m]);
+  return all;
 }
 
 }  // namespace rebounce

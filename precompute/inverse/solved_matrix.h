@@ -42,11 +42,18 @@ class SolvedMatrix final : public SymmetricMatrix {
                std::span<const std::uint32_t> columns,
                Eigen::Ref<Eigen::MatrixXf> entries) const override;
 
+  std::vector<Eigen::MatrixXf> all_entries(std::span<const std::uint32_t> rows,
+                                           std::span<const std::uint32_t> columns) const override;
+
  private:
   /// Neighbours in a list of patches that lie in the same cell.
   struct Run;
   std::vector<Run> runs_of(std::uint32_t matrix, std::span<const std::uint32_t> patches) const;
   void add_later_bounces(std::uint32_t matrix, const Run& row, const Run& column,
+                         Eigen::Ref<Eigen::MatrixXf> entries) const;
+  /// The same between two lists.
+  void add_later_bounces(std::uint32_t matrix, std::span<const std::uint32_t> rows,
+                         std::span<const std::uint32_t> columns,
                          Eigen::Ref<Eigen::MatrixXf> entries) const;
 
   /// The cell of a patch, and its index there.

@@ -71,7 +71,7 @@ TEST_F(CorrectedSolverOfRoom, FindsTheLightOfTheLinks) {
   const Lights compressed = solved_->indirect_irradiances(exitances);
   for (const double residual : {1e-2, 1e-4, 1e-6}) {
     const Lights found =
-        CorrectedSolver(*solved_, links_, patches()).indirect_irradiances(exitances, residual);
+        CorrectedSolver(*solved_, links_, patches()).indirect_irradiances(exitances, {residual});
     ASSERT_EQ(found.size(), exitances.size());
     for (std::size_t k = 0; k + 1 < found.size(); ++k) {
       EXPECT_LT(error(found[k], truths[k]), residual) << "light " << k;
@@ -89,7 +89,7 @@ TEST_F(CorrectedSolverOfRoom, MayBeginWithAnOperator) {
   const Lights truths = ReferenceSolver(links_, patches()).indirect_irradiances(exitances, 1e-12);
   for (const double residual : {1e-2, 1e-5}) {
     const Lights found = CorrectedSolver(*solved_, links_, patches(), nearly)
-                             .indirect_irradiances(exitances, residual);
+                             .indirect_irradiances(exitances, {residual});
     for (std::size_t k = 0; k + 1 < found.size(); ++k) {
       EXPECT_LT(error(found[k], truths[k]), residual) << "light " << k;
       EXPECT_GT(error(product(*nearly, exitances[k]), truths[k]), 2e-3) << "light " << k;
@@ -105,7 +105,7 @@ TEST_F(CorrectedSolverOfRoom, LeavesWhatCompressedFormFactorsCannotTellToTheLink
   const Lights exitances = lights(5, 3);
   const Lights truths = ReferenceSolver(links_, patches()).indirect_irradiances(exitances, 1e-12);
   const Lights found =
-      CorrectedSolver(solved, links_, patches()).indirect_irradiances(exitances, 1e-5);
+      CorrectedSolver(solved, links_, patches()).indirect_irradiances(exitances, {1e-5});
   for (std::size_t k = 0; k + 1 < found.size(); ++k) {
     EXPECT_LT(error(found[k], truths[k]), 1e-4) << "light " << k;
   }
@@ -114,7 +114,7 @@ TEST_F(CorrectedSolverOfRoom, LeavesWhatCompressedFormFactorsCannotTellToTheLink
 TEST_F(CorrectedSolverOfRoom, HasTheSameBitsForAnyNumberOfThreads) {
   const Lights exitances = lights(12, 4);
   const auto make = [&] {
-    return CorrectedSolver(*solved_, links_, patches()).indirect_irradiances(exitances, 1e-4);
+    return CorrectedSolver(*solved_, links_, patches()).indirect_irradiances(exitances, {1e-4});
   };
   EXPECT_EQ(test::with_threads(1, make), test::with_threads(3, make));
 }
