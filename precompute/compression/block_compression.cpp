@@ -19,8 +19,8 @@ using Eigen::MatrixXf;
 // Columns of a sketch beyond the wanted rank; Halko et al. advise 5 to 10.
 constexpr Index kOversampling = 8;
 
-// The difference of two energies of single precision is sure if it is more than this part of them.
-constexpr double kSureDifference = 1e-4;
+// Directions that have at least this part of the energy of a block are found in single precision.
+constexpr double kSinglePrecision = 1e-11;
 
 // In a block with more rows than this, ranks above a quarter of the rows are not tried.
 constexpr Index kLargeBlock = 128;
@@ -53,13 +53,13 @@ Spectrum gram_spectrum(const MatrixXd& a) {
 /// The leading left singular vectors of a block.
 class RowSpectrum : public Spectrum {
  public:
-  /// No more than `largest_rank` are wanted.
-  RowSpectrum(const WideBlock& block, Index largest_rank, std::uint64_t seed) {
+  /// No more than `largest_rank` are wanted. A direction is worth having for the energy `price`.
+  RowSpectrum(const WideBlock& block, Index largest_rank, double price, std::uint64_t seed) {
     const Index sketch_size = largest_rank + kOversampling;
     if (2 * sketch_size < block.rows()) {
-      sketch(block, sketch_size, seed);
+      sketch(block, random_signs(block.entries.cols(), sketch_size, seed), price);
     } else {
-      in_range_ = block.entries.cast<double>();
+      in_range_ = block.entries;
       static_cast<Spectrum&>(*this) = gram_spectrum(in_range_);
       in_range_directions_ = directions;
     }
@@ -71,18 +71,17 @@ class RowSpectrum : public Spectrum {
   }
 
  private:
-  void sketch(const WideBlock& block, Index size, std::uint64_t seed) {
-    const MatrixXf& whole = block.entries;
-    const MatrixXf sample = whole * random_signs(whole.cols(), size, seed);
-    const MatrixXd range = Eigen::HouseholderQR<MatrixXd>(sample.cast<double>()).householderQ() *
-                           MatrixXd::Identity(whole.rows(), size);
-    const MatrixXf rounded = range.cast<float>();
-    const MatrixXf kept = rounded.transpose() * whole;
-    in_range_ = kept.cast<double>();
+  void sketch(const WideBlock& block, const MatrixXf& signs, double price) {
+    const MatrixXd& whole = block.entries;
+    const double energy = whole.squaredNorm();
+    const MatrixXd sample = price > kSinglePrecision * energy
+                                ? MatrixXf(whole.cast<float>() * signs).cast<double>()
+                                : MatrixXd(whole * signs.cast<double>());
+    const MatrixXd range = Eigen::HouseholderQR<MatrixXd>(sample).householderQ() *
+                           MatrixXd::Identity(sample.rows(), sample.cols());
+    in_range_.noalias() = range.transpose() * whole;
     static_cast<Spectrum&>(*this) = gram_spectrum(in_range_);
-    const double energy = block.squared_norm();
-    double lost = energy - in_range_.squaredNorm();
-    if (lost < kSureDifference * energy) lost = WideBlock::energy_of(whole - rounded * kept);
+    const double lost = std::max(0.0, energy - in_range_.squaredNorm());
     for (double& energy_missing : missing) energy_missing += lost;
     in_range_directions_ = std::move(directions);
     directions = range * in_range_directions_;
@@ -215,7 +214,7 @@ void truncate(const WideBlock& block, const RowSpectrum& rows, Index largest,
 BlockAttempt compress_block(const WideBlock& block, const CompressionCost& cost, double limit,
                             Index largest_rank, std::uint64_t seed) {
   const Index largest = std::min(largest_rank, largest_worthwhile_rank(block, cost, limit));
-  const RowSpectrum rows(block, largest, seed);
+  const RowSpectrum rows(block, largest, cost.multiplier * size_per_rank(block, cost), seed);
   LowRankBlock result;
   result.on_diagonal = block.on_diagonal;
   if (block.on_diagonal) {

@@ -9,21 +9,13 @@ namespace rebounce {
 
 /// One block of each distinct channel side by side, [rows][matrices x columns].
 struct WideBlock {
-  Eigen::MatrixXf entries;
+  Eigen::MatrixXd entries;
   Eigen::Index matrix_count = 1;
   bool on_diagonal = false;
 
   Eigen::Index rows() const { return entries.rows(); }
   Eigen::Index columns() const { return entries.cols() / matrix_count; }
   auto matrix(Eigen::Index m) const { return entries.middleCols(m * columns(), columns()); }
-  /// Columns are summed in single precision, their sums in double.
-  double squared_norm() const { return energy_of(entries); }
-
-  static double energy_of(const Eigen::MatrixXf& matrix) {
-    double sum = 0;
-    for (Eigen::Index j = 0; j < matrix.cols(); ++j) sum += matrix.col(j).squaredNorm();
-    return sum;
-  }
 };
 
 /// B_m ~ row_basis coupling_m column_basis^T. On the diagonal the column basis is empty: it equals

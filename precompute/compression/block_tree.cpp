@@ -86,8 +86,10 @@ class PieceCompressor {
     block.entries.resize(place.row_count, matrix_count() * place.column_count);
     for (Index m = 0; m < matrix_count(); ++m) {
       block.entries.middleCols(m * place.column_count, place.column_count) =
-          matrices_[m].block(place.row_begin - row_begin_, place.column_begin - column_begin_,
-                             place.row_count, place.column_count);
+          matrices_[m]
+              .block(place.row_begin - row_begin_, place.column_begin - column_begin_,
+                     place.row_count, place.column_count)
+              .cast<double>();
     }
     return block;
   }
@@ -121,7 +123,7 @@ class PieceCompressor {
     const WideBlock block = weighted_block(place, row, column);
     const CompressionCost cost{
         .multiplier = multiplier_, .multiplicity = multiplicity(row, column), .sizes = sizes_};
-    const double zero_cost = cost.total(block.squared_norm(), sizes_.block);
+    const double zero_cost = cost.total(block.entries.squaredNorm(), sizes_.block);
     const double overhead = multiplier_ * sizes_.block;
     if (zero_cost <= 2 * overhead) return zero_part(place, zero_cost);
     const std::uint64_t seed = (std::uint64_t{rows.begin} << 32) + columns.begin + rows.count;
@@ -171,7 +173,8 @@ class PieceCompressor {
   BlockPart dense_part(const TransferBlock& place) const {
     const WideBlock block = wide_block(place);
     BlockPart part{{place}, {}, 0};
-    for (Index m = 0; m < block.matrix_count; ++m) append_rows(block.matrix(m), part.values);
+    for (Index m = 0; m < block.matrix_count; ++m)
+      append_rows(block.matrix(m).cast<float>(), part.values);
     part.cost = multiplier_ * (sizes_.block + static_cast<double>(part.values.size()));
     return part;
   }

@@ -13,7 +13,6 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-using Eigen::MatrixXf;
 using Eigen::VectorXd;
 
 // Directions of a cluster that get a strength of their own.
@@ -56,38 +55,16 @@ Principal principal_directions(const MatrixXd& sample) {
 
 }  // namespace
 
-template <typename Matrix>
-void ClusterWeight::do_weigh_rows(Eigen::Ref<Matrix> matrix) const {
-  using Scalar = typename Matrix::Scalar;
-  const Matrix directions = directions_.cast<Scalar>();
-  matrix = background_.cast<Scalar>().asDiagonal() * matrix;
-  const Matrix part = strength_.cast<Scalar>().asDiagonal() * (directions.transpose() * matrix);
-  matrix.noalias() += directions * part;
-}
-
-template <typename Matrix>
-void ClusterWeight::do_weigh_columns(Eigen::Ref<Matrix> matrix) const {
-  using Scalar = typename Matrix::Scalar;
-  const Matrix directions = directions_.cast<Scalar>();
-  matrix = matrix * background_.cast<Scalar>().asDiagonal();
-  const Matrix part = (matrix * directions) * strength_.cast<Scalar>().asDiagonal();
-  matrix.noalias() += part * directions.transpose();
-}
-
 void ClusterWeight::weigh_rows(Eigen::Ref<MatrixXd> matrix) const {
-  do_weigh_rows<MatrixXd>(matrix);
-}
-
-void ClusterWeight::weigh_rows(Eigen::Ref<MatrixXf> matrix) const {
-  do_weigh_rows<MatrixXf>(matrix);
+  matrix = background_.asDiagonal() * matrix;
+  const MatrixXd part = strength_.asDiagonal() * (directions_.transpose() * matrix);
+  matrix.noalias() += directions_ * part;
 }
 
 void ClusterWeight::weigh_columns(Eigen::Ref<MatrixXd> matrix) const {
-  do_weigh_columns<MatrixXd>(matrix);
-}
-
-void ClusterWeight::weigh_columns(Eigen::Ref<MatrixXf> matrix) const {
-  do_weigh_columns<MatrixXf>(matrix);
+  matrix = matrix * background_.asDiagonal();
+  const MatrixXd part = (matrix * directions_) * strength_.asDiagonal();
+  matrix.noalias() += part * directions_.transpose();
 }
 
 void ClusterWeight::send(Eigen::Ref<MatrixXd> lights) const {

@@ -27,11 +27,9 @@ class ClusterWeight {
 
   /// matrix = W^T matrix.
   void weigh_rows(Eigen::Ref<Eigen::MatrixXd> matrix) const;
-  void weigh_rows(Eigen::Ref<Eigen::MatrixXf> matrix) const;
 
   /// matrix = matrix W.
   void weigh_columns(Eigen::Ref<Eigen::MatrixXd> matrix) const;
-  void weigh_columns(Eigen::Ref<Eigen::MatrixXf> matrix) const;
 
   /// lights = W lights.
   void send(Eigen::Ref<Eigen::MatrixXd> lights) const;
@@ -44,11 +42,6 @@ class ClusterWeight {
   void unweigh_rows(Eigen::MatrixXd& basis) const;
 
  private:
-  template <typename Matrix>
-  void do_weigh_rows(Eigen::Ref<Matrix> matrix) const;
-  template <typename Matrix>
-  void do_weigh_columns(Eigen::Ref<Matrix> matrix) const;
-
   Eigen::VectorXd background_;
   Eigen::MatrixXd directions_;
   Eigen::VectorXd strength_;

@@ -24,9 +24,8 @@ MatrixXd random_orthonormal(Index rows, Index columns, std::uint64_t seed) {
 
 WideBlock block_with(Index size, const VectorXd& singular) {
   WideBlock block;
-  block.entries = (random_orthonormal(size, singular.size(), 1) * singular.asDiagonal() *
-                   random_orthonormal(size, singular.size(), 2).transpose())
-                      .cast<float>();
+  block.entries = random_orthonormal(size, singular.size(), 1) * singular.asDiagonal() *
+                  random_orthonormal(size, singular.size(), 2).transpose();
   return block;
 }
 
@@ -51,7 +50,7 @@ TEST(BlockCompression, SaysItsErrorAndTakesTheRankThatPays) {
     ASSERT_TRUE(attempt.block);
     EXPECT_GE(attempt.block->row_basis.cols(), 10) << size;
     EXPECT_LE(attempt.block->row_basis.cols(), size < 100 ? 12 : 16) << size;
-    const double error = (block.entries.cast<double>() - product(*attempt.block)).squaredNorm();
+    const double error = (block.entries - product(*attempt.block)).squaredNorm();
     EXPECT_NEAR(attempt.block->error_squared / error, 1, 1e-6) << size;
     EXPECT_NEAR(
         cost.of(*attempt.block),
@@ -97,7 +96,7 @@ TEST(BlockCompression, MoreRanksCostNoLessThanWasSaid) {
   int told = 0;
   for (const VectorXd& singular : spectra) {
     const WideBlock block = block_with(kSize, singular);
-    const double energy = block.squared_norm();
+    const double energy = block.entries.squaredNorm();
     for (const double multiplier : {1e-4, 1e-5, 1e-6, 1e-7}) {
       const CompressionCost cost{.multiplier = multiplier * energy / static_cast<double>(kSize)};
       const auto few = compress_block(block, cost, kNoLimit, kFew, 3);
