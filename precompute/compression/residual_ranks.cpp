@@ -85,9 +85,8 @@ double coupling_step(const LowRankBlock& block, const BlockWeights& weights,
   // as large. A unit of size has the bits of a half (lab/079, lab/146).
   constexpr double kBitsOfUnit = 16;
   const bool on_diagonal = block.column_basis.cols() == 0;
-  const double effect =
-      weighted_size({block.row_basis, weights.row}) +
-      weighted_size({on_diagonal ? block.row_basis : block.column_basis, weights.column});
+  const double effect = weighted_size({block.row_basis, weights.row}) +
+                        (on_diagonal ? 0 : weighted_size({block.column_basis, weights.column}));
   if (effect == 0) return 0;
   return std::sqrt(12 * cost.multiplier / (kBitsOfUnit * 2 * std::numbers::ln2 * effect));
 }

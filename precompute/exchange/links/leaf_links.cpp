@@ -54,7 +54,7 @@ std::vector<double> LeafLinks::counted_variance(const CountedExchange& counted) 
     const double found = counted.exchange(i, j, count_[k]);
     const double variance = counted.variance(i, j, found) / (geometry_.area(i) * geometry_.area(j));
     sum[i] += variance;
-    sum[j] += variance;
+    if (j != i) sum[j] += variance;
   }
   return sum;
 }

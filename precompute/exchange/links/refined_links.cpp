@@ -31,13 +31,15 @@ FormFactorSettings with_more_probes(FormFactorSettings settings) {
 }
 
 /// Rays that leave each patch beside the first ones, so that what its coarse links exchange is
-/// known as well as what other links do.
+/// known as well as what other links do. `rays` [n] are those that have left the patches; the first
+/// of each were `first_rays`.
 std::vector<double> further_rays(const LeafLinks& links, const CountedExchange& counted,
-                                 double epsilon, int first_rays) {
+                                 double epsilon, std::span<const double> rays, int first_rays) {
   std::vector<double> more = links.counted_variance(counted);
-  for (double& m : more) {
-    const double times = std::pow(std::sqrt(m) / (kCoarseNoise * epsilon), kRaysOfNoise);
-    m = times > 1 ? (std::min(std::ceil(times), kMostHemispheres) - 1) * first_rays : 0;
+  for (std::size_t i = 0; i < more.size(); ++i) {
+    const double noise = std::sqrt(more[i]) / (kCoarseNoise * epsilon);
+    const double hemispheres = std::ceil(std::pow(noise, kRaysOfNoise) * rays[i] / first_rays);
+    more[i] = noise > 1 ? (std::min(hemispheres, kMostHemispheres) - 1) * first_rays : 0;
   }
   return more;
 }
@@ -78,7 +80,8 @@ void RefinedLinks::measure(double epsilon, const Progress& progress) {
   LeafLinks leaves(tree_, geometry, links());
   leaves.count(hemispheres_);
   const CountedExchange first(geometry.areas(), hemispheres_.rays());
-  const std::vector<double> more = further_rays(leaves, first, epsilon, settings_.hemisphere_rays);
+  const std::vector<double> more =
+      further_rays(leaves, first, epsilon, hemispheres_.rays(), settings_.hemisphere_rays);
   if (hemispheres_.trace_further(more, part_of(progress, 0.0, 0.4))) leaves.count(hemispheres_);
   const CountedExchange counted(geometry.areas(), hemispheres_.rays());
   const PairExchange exchange(shadow_rays_, tracer_, counted, settings_);

@@ -11,7 +11,7 @@ using Vector = std::vector<double>;
 
 constexpr int kPassCount = 8;  // entries that reach their bounds leave a rest for the next pass
 constexpr int kMaxIterations = 500;  // of conjugate gradients; 20 to 60 are usual
-constexpr double kClosed = 1e-6;     // a row sum this near to its target is closed
+constexpr double kClosed = 1e-6;     // a row sum this near to what it is to be is closed
 constexpr double kResidual = 1e-11;  // relative residual of the solution
 constexpr float kLeastPart = 0.5F, kGreatestPart = 1.5F;
 
@@ -112,6 +112,25 @@ void give_way(const Vector& multiplier, const Areas& original, ExchangeRows& row
   }
 }
 
+/// What rows lack, in m². `total` are the multipliers so far: a row whose target is uncertain keeps
+/// deviation² times its multiplier of what it lacked.
+Vector missing_area(std::span<const double> sum, std::span<const double> area,
+                    std::span<const RowSumTarget> target, const Vector& total) {
+  Vector missing(sum.size());
+  for (std::size_t i = 0; i < sum.size(); ++i) {
+    const double deviation = area[i] * target[i].deviation;
+    missing[i] = area[i] * (target[i].sum - sum[i]) - deviation * deviation * total[i];
+  }
+  return missing;
+}
+
+bool is_closed(const Vector& missing, std::span<const double> area) {
+  for (std::size_t i = 0; i < missing.size(); ++i) {
+    if (std::abs(missing[i]) >= kClosed * area[i]) return false;
+  }
+  return true;
+}
+
 /// |S' - S| / |S|, Frobenius norms of the upper triangles.
 double relative_change(const ExchangeRows& rows, const Areas& original) {
   double change = 0, norm = 0;
@@ -155,12 +174,14 @@ ClosureReport enforce_closure(ExchangeRows& rows, std::span<const double> area,
   ClosureReport report;
   Vector sum = row_sums(rows, area);
   report.row_sum_error_before = largest_row_error(sum, target, /*certain=*/false);
-  Vector rest(rows.size());
+  Vector total(rows.size(), 0.0), rest = missing_area(sum, area, target, total);
   for (int pass = 0; pass < kPassCount; ++pass) {
-    for (std::size_t i = 0; i < rest.size(); ++i) rest[i] = area[i] * (target[i].sum - sum[i]);
-    give_way(NormalEquations(rows, area, target).solve(rest), original, rows);
+    const Vector multiplier = NormalEquations(rows, area, target).solve(rest);
+    give_way(multiplier, original, rows);
+    for (std::size_t i = 0; i < total.size(); ++i) total[i] += multiplier[i];
     sum = row_sums(rows, area);
-    if (largest_row_error(sum, target, /*certain=*/true) < kClosed) break;
+    rest = missing_area(sum, area, target, total);
+    if (is_closed(rest, area)) break;
   }
   report.row_sum_error_after = largest_row_error(sum, target, /*certain=*/true);
   report.relative_change = relative_change(rows, original);

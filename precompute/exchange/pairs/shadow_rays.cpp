@@ -79,16 +79,19 @@ void ShadowRays::make_pair_rays(std::uint32_t i, std::uint32_t j, std::span<Ray>
   PatchPointBlock::Coordinates weight;
   std::size_t made = 0;
   const std::size_t most = kCandidates * rays.size();
-  for (std::size_t begin = 0; begin < most && made < rays.size(); begin += kBlock) {
-    // Usually all candidates of the first block face each other.
-    const std::size_t count = std::min(kBlock, (begin == 0 ? rays.size() : most) - begin);
-    sequence.fill(static_cast<std::uint32_t>(begin / kBlock), count, square);
+  // Usually as many candidates as rays all face each other; the others are looked at after them.
+  std::size_t begin = 0, end = std::min(kBlock, rays.size());
+  while (begin < most && made < rays.size()) {
+    const std::size_t block = begin / kBlock, first = block * kBlock, count = end - first;
+    sequence.fill(static_cast<std::uint32_t>(block), count, square);
     geometry_.points(i, count, square[0], square[1], from);
     geometry_.points(j, count, square[2], square[3], to);
     find_kernels(from, to, count, weight);
-    for (std::size_t k = 0; k < count && made < rays.size(); ++k) {
+    for (std::size_t k = begin - first; k < count && made < rays.size(); ++k) {
       if (weight[k] > 0) rays[made++] = ray_between(point_of(from, k), point_of(to, k), weight[k]);
     }
+    begin = end;
+    end = std::min(most, (begin / kBlock + 1) * kBlock);
   }
   for (Ray& ray : rays.subspan(made)) ray = void_ray();
 }

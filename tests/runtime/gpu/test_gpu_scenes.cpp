@@ -162,6 +162,31 @@ FrameLight light_of_the_card(const Engine& engine) {
   return found;
 }
 
+/// How much larger than at patches rounding may be at each vertex: the sum of the magnitudes of its
+/// weights, which have both signs.
+std::vector<Float3> growth_at_vertices(const DisplayMesh& mesh) {
+  std::vector<Float3> growth(mesh.position.size());
+  for (std::size_t v = 0; v < growth.size(); ++v) {
+    float sum = 0;
+    for (std::uint32_t k = mesh.weight_begin[v]; k < mesh.weight_begin[v + 1]; ++k) {
+      sum += std::abs(mesh.weight[k]);
+    }
+    growth[v].fill(std::max(1.0F, sum));
+  }
+  return growth;
+}
+
+/// The largest difference, as a part of the mean of `wanted`, where each is divided by its growth.
+double largest_difference_over(std::span<const Float3> growth, std::span<const Float3> wanted,
+                               std::vector<Float3> found) {
+  for (std::size_t k = 0; k < found.size(); ++k) {
+    for (int c = 0; c < kChannelCount; ++c) {
+      found[k][c] = wanted[k][c] + (found[k][c] - wanted[k][c]) / growth[k][c];
+    }
+  }
+  return test::largest_difference(wanted, found);
+}
+
 // A lamp in the middle of the scene, and a dim sky: patches of full light beside dark ones.
 void expect_light_of_the_processor(const std::shared_ptr<const TransferData>& data) {
   const Light lamp = lamp_in_the_middle(*data);
@@ -177,18 +202,31 @@ void expect_light_of_the_processor(const std::shared_ptr<const TransferData>& da
   for (const double difference : of_floats) EXPECT_LE(difference, 1e-4);
   testing::Test::RecordProperty("from floats", std::to_string(std::ranges::max(of_floats)));
 
-  // The processor rounds the light to integers too, and weights of vertices have both signs.
-  const auto [indirect, radiosity, vertices, texels, at_probes] =
-      FrameLight(engine).differences(found);
+  // The processor rounds the light to integers too.
+  const FrameLight rounded(engine);
+  const auto [indirect, radiosity, at_vertices, at_texels, at_probes] = rounded.differences(found);
+  const std::vector<Float3> growth = growth_at_vertices(data->mesh);
+  std::vector<Float3> texel_growth(found.texels.size());
+  interpolate_at_texels(data->lightmap, data->mesh, growth, texel_growth);
+  for (Float3& g : texel_growth) {
+    for (float& of_channel : g) of_channel = std::max(of_channel, 1.0F);
+  }
+  const double vertices = largest_difference_over(growth, rounded.vertices, found.vertices);
+  const double texels = largest_difference_over(texel_growth, rounded.texels, found.texels);
   EXPECT_LE(indirect, 1e-3);
   EXPECT_LE(radiosity, 1e-3);
   EXPECT_LE(at_probes, 1e-3);
-  EXPECT_LE(vertices, 6e-3);
-  EXPECT_LE(texels, 6e-3);
+  EXPECT_LE(vertices, 1e-3);
+  EXPECT_LE(texels, 1e-3);
   testing::Test::RecordProperty("at patches and probes",
                                 std::to_string(std::max({indirect, radiosity, at_probes})));
   testing::Test::RecordProperty("at vertices and texels",
+                                std::to_string(std::max(at_vertices, at_texels)));
+  testing::Test::RecordProperty("at vertices and texels, for their weights",
                                 std::to_string(std::max(vertices, texels)));
+  float largest = 0;
+  for (const Float3& g : growth) largest = std::max(largest, g[0]);
+  testing::Test::RecordProperty("largest sum of weights", std::to_string(largest));
 }
 
 /// Expects the light of `lamp` with its shadow map to be that of shadow rays, to a part of it in
