@@ -19,7 +19,8 @@ using Eigen::MatrixXf;
 // Columns of a sketch beyond the wanted rank; Halko et al. advise 5 to 10.
 constexpr Index kOversampling = 8;
 
-// Directions that have at least this part of the energy of a block are found in single precision.
+// Directions that have at least this part of the energy of a block are found in single precision
+// (lab/149).
 constexpr double kSinglePrecision = 1e-11;
 
 // In a block with more rows than this, ranks above a quarter of the rows are not tried.
