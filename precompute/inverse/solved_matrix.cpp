@@ -53,7 +53,7 @@ void SolvedMatrix::add_later_bounces(std::uint32_t matrix, const Run& row, const
 
 void SolvedMatrix::add_later_bounces(std::uint32_t matrix, std::span<const std::uint32_t> rows,
                                      std::span<const std::uint32_t> columns,
-                                     Eigen::Ref<MatrixXf> entries) const {
+                                     const Eigen::Ref<MatrixXf>& entries) const {
   const std::vector<Run> row_runs = runs_of(matrix, rows), column_runs = runs_of(matrix, columns);
   for (const Run& column : column_runs) {
     for (const Run& row : row_runs) add_later_bounces(matrix, row, column, entries);

@@ -54,7 +54,7 @@ class SolvedMatrix final : public SymmetricMatrix {
   /// The same between two lists.
   void add_later_bounces(std::uint32_t matrix, std::span<const std::uint32_t> rows,
                          std::span<const std::uint32_t> columns,
-                         Eigen::Ref<Eigen::MatrixXf> entries) const;
+                         const Eigen::Ref<Eigen::MatrixXf>& entries) const;
 
   /// The cell of a patch, and its index there.
   struct Place {
