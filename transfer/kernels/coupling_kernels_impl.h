@@ -223,12 +223,8 @@ REBOUNCE_INLINE inline void spread_residuals(float* out, const CouplingEnd& end)
   }
 }
 
-template <typename V>
-REBOUNCE_INLINE inline void darken(float* out, const CouplingEnd& end) {
-  const std::size_t all = end.count + end.residual_count;
-  for (std::size_t k = 0; k < all; k += V::kWidth) {
-    V::zero().store_some(out + end.first + k, std::min(all - k, V::kWidth));
-  }
+inline void darken(float* out, const CouplingEnd& end) {
+  std::fill_n(out + end.first, end.count + end.residual_count, 0.0F);
 }
 
 // Coupling matrices are prefetched this many ahead: those that a sweep or an apply skips break the
@@ -271,12 +267,12 @@ void multiply_lit(const Rows& rows, const CouplingBlock& coupling, const float* 
   if (light_to_rows) {
     spread_residuals<V>(out, row);
   } else if (to_rows) {
-    darken<V>(out, row);
+    darken(out, row);
   }
   if (light_to_columns) {
     spread_residuals<V>(out, column);
   } else if (to_columns) {
-    darken<V>(out, column);
+    darken(out, column);
   }
 }
 

@@ -34,7 +34,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <limits>
 
 #include "rebounce/types.h"
@@ -76,20 +75,16 @@ struct IntegerScales {
     constexpr std::uint32_t kExponent = 0x7F800000, kOne = 127U << 23;
     constexpr std::uint32_t kLargest = 14U << 23;
     constexpr std::uint32_t kDark = kOne - (100U << 23);  // anything below 2^-100 is as dark
-    const FourBits dark{kDark, kDark, kDark, kDark};
-    const auto power = [=](const ChannelFloats& magnitude) REBOUNCE_INLINE {
-      const FourBits bits = std::bit_cast<FourBits>(magnitude) & kExponent;
-      return bits > dark ? bits : dark;
+    const auto power = [=](float magnitude) {
+      return std::max(std::bit_cast<std::uint32_t>(magnitude) & kExponent, kDark);
     };
-    const FourBits by_largest = power(light.largest) - kLargest;
-    const FourBits by_sum = power(light.sum) - ((kLargestSum - 1) << 23);
-    const FourBits one = by_largest > by_sum ? by_largest : by_sum;
-    to = std::bit_cast<ChannelFloats>(2 * kOne - one);
-    back = std::bit_cast<ChannelFloats>(one);
+    for (std::size_t c = 0; c < kChannelLanes; ++c) {
+      const std::uint32_t one = std::max(power(light.largest[c]) - kLargest,
+                                         power(light.sum[c]) - ((kLargestSum - 1) << 23));
+      to[c] = std::bit_cast<float>(2 * kOne - one);
+      back[c] = std::bit_cast<float>(one);
+    }
   }
-
- private:
-  using FourBits = std::uint32_t __attribute__((vector_size(sizeof(ChannelFloats))));
 };
 
 /// Light below this is as dark as none.
@@ -307,11 +302,7 @@ void project_part(const std::int8_t* values, const BasisPart& part, const float*
       any = true;
     }
   }
-  if (any) return;
-  constexpr std::array<float, kRankGroup * kChannelLanes> kNone{};
-  for (std::size_t g = 0; g < groups.count; ++g) {
-    std::memcpy(to + g * kNone.size(), kNone.data(), sizeof kNone);
-  }
+  if (!any) std::fill_n(to, groups.count * kRankGroup * kChannelLanes, 0.0F);
 }
 
 template <typename N>
@@ -447,36 +438,21 @@ REBOUNCE_INLINE inline void expand_chunk(const std::int8_t* values, const BasisP
 template <typename N>
 void expand_integers(const std::int8_t* values, std::span<const BasisPart> parts,
                      Coefficients<const float> coefficient, PlanarVectors<float> y) {
-  // A chunk is rounded before the one before it is expanded, so that the processor does both at a
-  // time: rounding waits for its own results, expansion for memory.
-  IntegerCoefficients rounded[2];
-  struct Chunk {
-    const BasisPart* part = nullptr;
-    std::size_t first_rank, light;
-  };
-  Chunk last;
-  bool turn = false;
-  const auto expand_last = [&] {
-    if (last.part == nullptr || rounded[!turn].group_count == 0) return;
-    expand_chunk<N>(values, *last.part, last.first_rank, rounded[!turn],
-                    y.data + last.light * kChannelCount * y.stride, y.stride);
-  };
+  IntegerCoefficients rounded;
   for (const BasisPart& part : parts) {
-    for (std::size_t light = 0; light < y.count / kChannelCount; ++light) {
-      const float* const from = coefficient.data + light * coefficient.stride +
+    for (std::size_t v = 0; v < y.count; v += kChannelCount) {
+      const float* const from = coefficient.data + v / kChannelCount * coefficient.stride +
                                 std::size_t{part.coefficient} * kChannelLanes;
       const std::size_t first_group = part.first_rank / kRankGroup;
       for (std::size_t r = first_group * kRankGroup; r < part.last_rank; r += kChunk) {
         const RankRange ranks{std::max<std::size_t>(part.first_rank, r) - r,
                               std::min(part.last_rank - r, kChunk)};
-        round_coefficients<N>(from + r * kChannelLanes, ranks, rounded[turn]);
-        expand_last();
-        last = {&part, r, light};
-        turn = !turn;
+        round_coefficients<N>(from + r * kChannelLanes, ranks, rounded);
+        if (rounded.group_count > 0)
+          expand_chunk<N>(values, part, r, rounded, y.data + v * y.stride, y.stride);
       }
     }
   }
-  expand_last();
 }
 
 }  // namespace
