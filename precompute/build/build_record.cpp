@@ -86,6 +86,7 @@ std::string report_json(const BuildReport& report, const std::vector<KindError>&
                       {"pairs", report.pair_count},
                       {"form_factors", report.form_factor_count},
                       {"links", report.link_count},
+                      {"solves", report.solve_count},
                       {"row_sum_error_before", report.closure.row_sum_error_before},
                       {"row_sum_error_after", report.closure.row_sum_error_after},
                       {"closure_change", report.closure.relative_change},

@@ -180,6 +180,7 @@ class LinkedOperator {
       solved_.emplace(*data_.compressed_form_factors, data_.patches, lights, settings, part);
       return solved_->compress(lights, tolerance(), part_of(part, solved_->solving_part(), 1));
     });
+    report_.solve_count = solved_->solve_count();
     report_.form_factor_error = form_factor_error(*data_.compressed_form_factors, *links_,
                                                   data_.patches, lights_.test_radiosities);
     lights_ = {};  // what follows takes their memory

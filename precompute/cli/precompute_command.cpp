@@ -112,6 +112,10 @@ void print_summary(const TransferData& data, const BuildReport& report, std::uin
       operator_name(data.transfer->kind()), static_cast<double>(data.transfer->bytes()) / (1 << 20),
       static_cast<double>(data.transfer->bytes()) / static_cast<double>(report.patch_count),
       data.record.solve_residual, data.record.error_mean, data.record.error_max);
+  if (report.solve_count > 0) {
+    fmt::print("solved for {} vectors, {:.2f} a patch\n", report.solve_count,
+               static_cast<double>(report.solve_count) / static_cast<double>(report.patch_count));
+  }
   if (report.whole_error) {
     const SampledError &whole = report.whole_error->whole, &links = report.whole_error->links;
     fmt::print(

@@ -112,6 +112,15 @@ double CouplingSolver::work_of(std::size_t first) const {
   return work;
 }
 
+std::size_t CouplingSolver::vector_count() const {
+  Index count = 0;
+  for (std::size_t cell = 0; cell < bases_.cell_count(); ++cell) {
+    if (!is_wanted_[cell]) continue;
+    for (std::uint32_t m = 0; m < solved_.matrix_count(); ++m) count += bases_.rank(m, cell);
+  }
+  return static_cast<std::size_t>(count);
+}
+
 double CouplingSolver::work() const {
   const Ranks ranks;
   double work = 0;

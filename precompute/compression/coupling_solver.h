@@ -29,6 +29,9 @@ class CouplingSolver {
   CouplingSolver(const SolvedTransfer& solved, const SharedBases& bases, const FramedCells& cells,
                  std::size_t cells_together, const BlockCheckpoint& checkpoint);
 
+  /// The vectors of all wanted cells, whoever solves for them.
+  std::size_t vector_count() const;
+
   /// The vectors that this rank has to solve for.
   double work() const;
 

@@ -85,6 +85,7 @@ struct MatrixFreeTransfer::State {
   std::string couplings_key;
   SolvedTransfer solved;
   SolvedMatrix matrix;
+  std::size_t solve_count = 0;
   double solving_part = 0;
 };
 
@@ -107,6 +108,7 @@ MatrixFreeTransfer::MatrixFreeTransfer(const HierarchicalOperator& form_factors,
   CouplingSolver solver(state.solved, bases, {frame, cells}, state.plan.cell_count, checkpoint);
   const double begin = kBefore / usual, all = kBefore + solver.work() + kVectorsOfRounds;
   state.solving_part = std::max(begin, (kBefore + solver.work()) / all);
+  state.solve_count = bases.sample_count + solver.vector_count();
   std::vector<std::vector<float>> couplings =
       solver.run(part_of(progress, begin, state.solving_part));
   state.matrix.set_entries(std::move(bases), std::move(couplings));
@@ -116,6 +118,10 @@ MatrixFreeTransfer::~MatrixFreeTransfer() = default;
 
 const SolvedTransfer& MatrixFreeTransfer::solved() const {
   return state_->solved;
+}
+
+std::size_t MatrixFreeTransfer::solve_count() const {
+  return state_->solve_count;
 }
 
 double MatrixFreeTransfer::solving_part() const {

@@ -42,6 +42,10 @@ class MatrixFreeTransfer {
   /// Products with the inverse of `form_factors`, as exact as the bases need.
   const SolvedTransfer& solved() const;
 
+  /// Vectors that were solved for, or found in the checkpoint: samples for the bases, and vectors
+  /// of the bases.
+  std::size_t solve_count() const;
+
   /// The part of the time that solving takes, for progress.
   double solving_part() const;
 

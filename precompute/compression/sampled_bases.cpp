@@ -276,9 +276,9 @@ std::vector<Index> find_ranks(const BasisSampler& sampler, std::span<const Direc
   return ranks;
 }
 
-/// The bases of one matrix.
-std::vector<SharedBases::Basis> sample_matrix(const BasisSampler& sampler, std::uint32_t matrix,
-                                              double allowed, const Progress& progress) {
+/// Appends the bases of one matrix.
+void sample_matrix(const BasisSampler& sampler, std::uint32_t matrix, double allowed,
+                   SharedBases& result, const Progress& progress) {
   std::uint64_t number = 0;
   const auto draw = [&] {
     report_progress(progress, std::min(1.0, static_cast<double>(number * kSamples) / kMostSamples));
@@ -296,11 +296,12 @@ std::vector<SharedBases::Basis> sample_matrix(const BasisSampler& sampler, std::
       append(light, judges);
       continue;
     }
-    std::vector<SharedBases::Basis> bases;
+    std::vector<SharedBases::Basis>& bases = result.bases.emplace_back();
     for (std::size_t c = 0; c < ranks.size(); ++c) {
       bases.push_back(sampler.basis(c, directions[c], ranks[c]));
     }
-    return bases;
+    result.sample_count += number * static_cast<std::size_t>(kSamples);
+    return;
   }
 }
 
@@ -316,8 +317,7 @@ SharedBases sample_bases(const SolvedTransfer& solved, const CompressionFrame& f
   // Errors count on both sides, and in every channel.
   const double allowed = tolerance * tolerance / 2 / kChannelCount;
   for (std::uint32_t m = 0; m < solved.matrix_count(); ++m) {
-    result.bases.push_back(
-        sample_matrix(sampler, m, allowed, part_of(progress, m / count, (m + 1) / count)));
+    sample_matrix(sampler, m, allowed, result, part_of(progress, m / count, (m + 1) / count));
   }
   return result;
 }

@@ -76,6 +76,9 @@ struct BuildReport {
   std::uint64_t ray_count = 0, pair_count = 0, form_factor_count = 0;
   std::size_t link_count = 0;  ///< that are stored
   ClosureReport closure;
+  /// Vectors that an operator from links was solved for. One for each patch and each channel whose
+  /// reflectances differ from those of the others would be all columns of Y.
+  std::size_t solve_count = 0;
   /// Of the compressed form factors: relative area-weighted L2 error of F B under lights that they
   /// were not fitted to.
   std::optional<FormFactorError> form_factor_error;

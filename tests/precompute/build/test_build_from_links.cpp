@@ -133,6 +133,7 @@ TEST(BuildFromLinks, KeepsNoPairsAndIsTheirLightWithTheErrorOnRecord) {
   EXPECT_FALSE(data.links.empty());
   EXPECT_EQ(report.form_factor_count, 0U);
   EXPECT_EQ(report.link_count, data.links.pair.size());
+  EXPECT_GT(report.solve_count, 0U);
 
   // The error on record is that against the links.
   EXPECT_GT(data.record.error_mean, 0);

@@ -259,6 +259,7 @@ TEST_F(PrecomputeCommand, WorksWithoutPairs) {
   EXPECT_EQ(built["form_factors"], "compressed");
   EXPECT_EQ(built["form_factor_count"], 0);
   EXPECT_GT(built["link_count"], 0);
+  EXPECT_GT(built["report"]["solves"], 0);
   EXPECT_EQ(built["settings"]["form_factors"], "links");
   const json info = summary_of({"info", file});
   EXPECT_EQ(info["operator"], "hierarchical");
