@@ -8,7 +8,7 @@
 #include <map>
 #include <utility>
 
-#include "precompute/base/disjoint_sets.h"
+#include "transfer/base/disjoint_sets.h"
 #include "precompute/base/edge_table.h"
 #include "precompute/import/import_gltf.h"
 #include "precompute/patches/welded_positions.h"

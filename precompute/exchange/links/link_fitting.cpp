@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "precompute/base/disjoint_sets.h"
+#include "transfer/base/disjoint_sets.h"
 #include "precompute/exchange/links/affine_links.h"
 #include "precompute/exchange/links/link_choice.h"
 #include "precompute/exchange/links/pair_sums.h"

@@ -5,6 +5,7 @@
 
 #include "runtime/demo/image/srgb.h"
 #include "runtime/rays/float3_glm.h"
+#include "runtime/rays/triangle.h"
 
 namespace rebounce {
 namespace {
@@ -13,15 +14,8 @@ constexpr int kMaxLevel = 8;  // at most 4^8 pieces of one triangle
 
 using Corners = std::array<glm::vec3, 3>;
 
-double area_of(const Corners& corner) {
-  const glm::dvec3 a(corner[0]);
-  return 0.5 * glm::length(glm::cross(glm::dvec3(corner[1]) - a, glm::dvec3(corner[2]) - a));
-}
-
-Corners corners_of(const DisplayMesh& mesh, std::uint32_t triangle) {
-  const Uint3& corner = mesh.triangle[triangle];
-  return {to_glm(mesh.position[corner[0]]), to_glm(mesh.position[corner[1]]),
-          to_glm(mesh.position[corner[2]])};
+double area_of_piece(const Corners& corner) {
+  return area_of(TriangleCorners{corner[0], corner[1], corner[2]});
 }
 
 // The power of a triangle up to a common factor; 0 if it does not emit.
@@ -75,7 +69,7 @@ void Emitters::add_pieces(const DisplaySurface& surface, std::uint32_t triangle,
         surface.point_on(triangle, (weight[0] + weight[1] + weight[2]) / 3.0F);
     piece.centroid = middle.position;
     piece.normal = middle.geometric_normal;
-    piece.area = static_cast<float>(area_of(piece.corner));
+    piece.area = static_cast<float>(area_of_piece(piece.corner));
     piece.luminance = solid_part * surface.emitted_luminance(middle, std::sqrt(piece.area));
     if (piece.luminance != glm::vec3(0)) pieces_.push_back(piece);
   }

@@ -216,6 +216,16 @@ TEST_F(ViewCommand, LampsWithASurfaceLookAsRenderDrawsThem) {
   }
 }
 
+TEST_F(ViewCommand, AnEmittingRectangleLooksAsRenderDrawsIt) {
+  const Outcome outcome = run({"render", file_, "--size", "240x160", "--show", "direct", "--quiet",
+                               "--exposure", "-5", "-o", path("render.png")});
+  EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
+  const Image drawn = read_image(path("render.png"));
+  EXPECT_GT(drawn.mean(0), 20);
+  // Light at the vertices of 120 patches is 1.6 off.
+  EXPECT_LT(difference(screenshot({"--show", "direct", "--exposure", "-5"}), drawn).mean, 0.9);
+}
+
 TEST_F(ViewCommand, TheGraphicsCardShowsThePictureOfTheProcessor) {
   const Outcome tried = run({"view", file_, "--size", "16x16", "--method", "graphics-card",
                              "--screenshot", path("try.png")});

@@ -123,12 +123,14 @@ float part_to_plane(vec3 to, vec3 way, vec3 geometric_normal) {
   return slope < 0 && height < 0 ? clamp(height / slope, 0.95, 1.0) : 1.0;
 }
 
-// How wide the half shadow of a place is at the receiver, metres.
-float half_shadow(vec3 way, vec3 geometric_normal, mat2x3 axes, int place) {
+// How wide the half shadow of a place is at the receiver, metres. What lies behind the surface of
+// the lamp there stops none of its light.
+float half_shadow(vec3 way, vec3 geometric_normal, vec3 lamp_normal, mat2x3 axes, int place) {
   float sum = 0, found = 0;
   for (int k = 0; k < kPlaceTaps; ++k) {
     vec2 at = kWidest * tap(k, kPlaceTaps);
     vec3 to = way + axes * (place_reach * at);
+    if (dot(lamp_normal, to) <= 0) continue;
     float part = metres_at(texture(place_depth, face_coordinates(to, place)).r) / largest(to);
     // Near enough to the lamp to be between it and the receiver, and not the receiver itself.
     if (part > part_to_plane(to, way, geometric_normal) - 2e-3) continue;
@@ -139,17 +141,19 @@ float half_shadow(vec3 way, vec3 geometric_normal, mat2x3 axes, int place) {
   return found > 0 ? place_reach * min(found / sum - 1, kWidest) : 0.0;
 }
 
-float place_visibility(vec3 way, vec3 geometric_normal, int place) {
+float place_visibility(vec3 way, vec3 geometric_normal, vec3 lamp_normal, int place) {
   mat2x3 axes = across(way);
   float spread = max(kRadius * texel * largest(way),
-                     half_shadow(way, geometric_normal, axes, place));
-  float sum = 0;
+                     half_shadow(way, geometric_normal, lamp_normal, axes, place));
+  float sum = 0, count = 0;
   for (int k = 0; k < kPlaceTaps; ++k) {
     vec3 to = way + axes * (spread * tap(k, kPlaceTaps));
+    if (dot(lamp_normal, to) <= 0) continue;
     to *= part_to_plane(to, way, geometric_normal);
     sum += texture(place_shadow, vec4(face_coordinates(to, place), depth_at(largest(to))));
+    count += 1;
   }
-  return sum / float(kPlaceTaps);
+  return count > 0 ? sum / count : 1.0;
 }
 )";
 
@@ -167,7 +171,8 @@ float surface_visibility(vec3 point, vec3 normal, vec3 geometric_normal) {
     all += weight;
     if (dot(geometric_normal, to_place) <= 0) continue;
     seen += weight *
-            place_visibility(lifted_way(-to_place, geometric_normal), geometric_normal, k);
+            place_visibility(lifted_way(-to_place, geometric_normal), geometric_normal, lamp_normal,
+                             k);
   }
   return all > 0 ? seen / all : 0.0;
 }

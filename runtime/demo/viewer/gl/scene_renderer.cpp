@@ -52,11 +52,14 @@ glm::mat4 view_of(const Camera& camera, float aspect, const SceneBounds& bounds)
 
 }  // namespace
 
-SceneRenderer::SceneRenderer(const GpuScene& scene, const DisplayMesh& mesh)
+SceneRenderer::SceneRenderer(const GpuScene& scene, const DisplayMesh& mesh,
+                             std::span<const Light> emitter_lamps)
     : scene_(scene),
       bounds_(bounds_of(mesh)),
+      emitter_lamps_(emitter_lamps),
       spheres_(scene),
       lamp_surfaces_(scene),
+      no_bodies_(scene),
       ambient_(shaders::kSceneVertex, shaders::kAmbientFragment),
       lamp_(shaders::kSceneVertex, shaders::lamp_fragment().c_str()),
       patch_(shaders::kSceneVertex, shaders::kPatchFragment),
@@ -74,16 +77,17 @@ void SceneRenderer::set_bodies(BodyMesh spheres, bool keeps_places, std::span<co
   lamp_surfaces_.upload(std::move(surfaces));
 }
 
-void SceneRenderer::update_shadows(std::span<const Light> lights) {
-  while (shadow_maps_.size() < lights.size()) {
-    shadow_maps_.push_back(std::make_unique<ShadowMap>());
-  }
-  shadow_maps_.resize(lights.size());
-  const int side = lights.size() > kFewLamps ? kSideOfMany : kSideOfFew;
-  const ShadowCasters casters{scene_, spheres_, bounds_, spheres_version_};
-  for (std::size_t k = 0; k < lights.size(); ++k) {
-    shadow_maps_[k]->update(lights[k], casters, shadow_, side);
-  }
+void SceneRenderer::update_shadows(std::span<const Light> lights, bool draws_emitter_lamps) {
+  const auto update = [&](auto& maps, std::span<const Light> lamps, const ShadowCasters& casters) {
+    const int side = lamps.size() > kFewLamps ? kSideOfMany : kSideOfFew;
+    while (maps.size() < lamps.size()) maps.push_back(std::make_unique<ShadowMap>());
+    maps.resize(lamps.size());
+    for (std::size_t k = 0; k < lamps.size(); ++k) {
+      maps[k]->update(lamps[k], casters, shadow_, side);
+    }
+  };
+  update(shadow_maps_, lights, {scene_, spheres_, bounds_, spheres_version_});
+  if (draws_emitter_lamps) update(emitter_maps_, emitter_lamps_, {scene_, no_bodies_, bounds_});
 }
 
 void SceneRenderer::draw(const FrameSettings& frame, GLuint framebuffer) {
@@ -196,7 +200,13 @@ void SceneRenderer::draw_light(const FrameSettings& frame, const glm::mat4& view
   lamp_.set("base_color_texture", 0);
   lamp_.set("eye", to_glm(frame.camera.position));
   for (std::size_t k = 0; k < frame.lights.size(); ++k) {
-    draw_lamp(frame.lights[k], *shadow_maps_[k]);
+    set_lamp(frame.lights[k], *shadow_maps_[k]);
+    scene_.draw_materials(lamp_, Side::kFirst);
+    spheres_.draw(lamp_, Side::kFirst);
+  }
+  for (std::size_t k = 0; frame.draws_emitter_lamps && k < emitter_lamps_.size(); ++k) {
+    set_lamp(emitter_lamps_[k], *emitter_maps_[k]);
+    scene_.draw_materials(lamp_, Side::kFirst);
   }
   glDisable(GL_BLEND);
   glDepthMask(GL_TRUE);
@@ -210,7 +220,7 @@ void SceneRenderer::draw_lamp_surfaces() const {
   glDisable(GL_POLYGON_OFFSET_FILL);
 }
 
-void SceneRenderer::draw_lamp(const Light& light, const ShadowMap& shadow) {
+void SceneRenderer::set_lamp(const Light& light, const ShadowMap& shadow) const {
   shadow.bind(lamp_);
   lamp_.set("lamp_type", static_cast<int>(light.type));
   lamp_.set("shadow_map", static_cast<int>(lamp_kind(light.type).shadow_map));
@@ -221,8 +231,6 @@ void SceneRenderer::draw_lamp(const Light& light, const ShadowMap& shadow) {
   lamp_.set("cos_inner", std::cos(light.inner_cone_angle));
   lamp_.set("cos_outer", std::cos(light.outer_cone_angle));
   if (lamp_kind(light.type).surface != nullptr) set_lamp_surface(PreparedLight(light));
-  scene_.draw_materials(lamp_, Side::kFirst);
-  spheres_.draw(lamp_, Side::kFirst);
 }
 
 void SceneRenderer::set_lamp_surface(const PreparedLight& lamp) const {

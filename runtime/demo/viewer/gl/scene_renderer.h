@@ -26,6 +26,7 @@ struct FrameSettings {
   float exposure = 0;            ///< stops
   std::optional<float> split{};  ///< fraction of the width that shows the first side; unset: all
   std::span<const Light> lights{};
+  bool draws_emitter_lamps = true;  ///< of the renderer
   Sky sky{};
 };
 
@@ -33,15 +34,17 @@ struct FrameSettings {
 /// with high dynamic range; then exposure, tone curve and encoding as in picture.h.
 class SceneRenderer {
  public:
-  /// `scene` must outlive the renderer.
-  SceneRenderer(const GpuScene& scene, const DisplayMesh& mesh);
+  /// `emitter_lamps` stand for emitting surface, and light the scene alone. They and `scene` must
+  /// outlive the renderer.
+  SceneRenderer(const GpuScene& scene, const DisplayMesh& mesh,
+                std::span<const Light> emitter_lamps);
 
   /// Sets the moving objects of the next frames: `spheres`, which cast shadows, and lamps.
   /// `keeps_places`: the spheres have not moved.
   void set_bodies(BodyMesh spheres, bool keeps_places, std::span<const Light> lamps);
 
-  /// Updates the shadow maps, one for each light.
-  void update_shadows(std::span<const Light> lights);
+  /// Updates the shadow maps, one for each light; those of emitter lamps once, if they are drawn.
+  void update_shadows(std::span<const Light> lights, bool draws_emitter_lamps);
 
   /// The map of light k of the last update_shadows.
   const ShadowMap& shadow_map(std::size_t k) const { return *shadow_maps_[k]; }
@@ -55,7 +58,7 @@ class SceneRenderer {
   void draw_sky(const FrameSettings& frame) const;
   void draw_light(const FrameSettings& frame, const glm::mat4& view);
   void draw_lamp_surfaces() const;
-  void draw_lamp(const Light& light, const ShadowMap& shadow);
+  void set_lamp(const Light& light, const ShadowMap& shadow) const;
   void set_lamp_surface(const PreparedLight& lamp) const;
   void draw_patches(const FrameSettings& frame, const glm::mat4& view);
   int split_column(const FrameSettings& frame) const;
@@ -65,11 +68,12 @@ class SceneRenderer {
 
   const GpuScene& scene_;
   SceneBounds bounds_;
-  GpuBodies spheres_, lamp_surfaces_;
+  std::span<const Light> emitter_lamps_;
+  GpuBodies spheres_, lamp_surfaces_, no_bodies_;
   int spheres_version_ = 0;
   GlProgram ambient_, lamp_, patch_, shadow_, screen_, sky_;
   GlVertexArray empty_;
-  std::vector<std::unique_ptr<ShadowMap>> shadow_maps_;
+  std::vector<std::unique_ptr<ShadowMap>> shadow_maps_, emitter_maps_;
   MultisampledTarget target_;
 };
 

@@ -55,7 +55,7 @@ FrameDrawer::FrameDrawer(const std::shared_ptr<const TransferData>& data, const 
     : data_(data),
       lit_(data, setup.reference, setup.make_probes),
       gpu_(*data),
-      renderer_(gpu_, data->mesh),
+      renderer_(gpu_, data->mesh, lit_.emitter_lamps()),
       has_card_(CardLight::is_possible(*data)) {}
 
 void FrameDrawer::draw(ViewerState& state, int width, int height, GLuint framebuffer) {
@@ -86,6 +86,8 @@ void FrameDrawer::draw(ViewerState& state, int width, int height, GLuint framebu
   }
   if (state.show == Show::kError) compare(state);
   const std::vector<Light> lamps = without_profiles(lights);
+  const bool shows_direct = state.show == Show::kRadiosity || state.show == Show::kDirect;
+  const bool draws_emitter_lamps = state.draws_emitter_lamps && shows_direct;
   times_.upload = microseconds_of([&] {
     upload(state);
     std::vector<ViewerSphere> spheres = state.spheres_now();
@@ -93,7 +95,7 @@ void FrameDrawer::draw(ViewerState& state, int width, int height, GLuint framebu
                          std::ranges::equal(spheres, spheres_, has_same_place), lamps);
     spheres_ = std::move(spheres);
   });
-  times_.shadows = microseconds_of([&] { renderer_.update_shadows(lamps); });
+  times_.shadows = microseconds_of([&] { renderer_.update_shadows(lamps, draws_emitter_lamps); });
   times_.card.clear();
   if (any_on_card) relight_on_card(state, lights);
   FrameSettings frame{.width = width,
@@ -102,6 +104,7 @@ void FrameDrawer::draw(ViewerState& state, int width, int height, GLuint framebu
                       .show = state.show,
                       .exposure = state.exposure,
                       .lights = lamps,
+                      .draws_emitter_lamps = draws_emitter_lamps,
                       .sky = state.sky};
   if (state.is_split) frame.split = state.split;
   times_.draw = microseconds_of([&] { renderer_.draw(frame, framebuffer); });
@@ -130,7 +133,7 @@ void FrameDrawer::upload(const ViewerState& state) {
     gpu_.upload_patch_colors(Side::kSecond, color);
     return;
   }
-  gpu_.upload_first_flight(lit_.first_flight_at_vertices(state.sky));
+  gpu_.upload_first_flight(lit_.first_flight_at_vertices(state.sky, state.draws_emitter_lamps));
   for (std::size_t k = 0; k < state.shown_methods().size(); ++k) {
     const auto side = static_cast<Side>(k);
     if (!state.methods[k].on_card) gpu_.upload_bounced(side, lit_.bounced_at_vertices(side));

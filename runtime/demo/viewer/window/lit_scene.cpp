@@ -16,18 +16,38 @@
 #include "transfer/base/area_norm.h"
 
 namespace rebounce {
+namespace {
+
+// Each draws the scene 96 times once, and takes 96 MiB.
+constexpr std::size_t kMostRectangles = 4;
+
+}  // namespace
 
 LitScene::LitScene(std::shared_ptr<const TransferData> data, Reference reference,
                    MakeProbes make_probes)
     : data_(std::move(data)),
       engine_(data_),
       emitted_(irradiance_from_emitters(*data_)),
+      rectangles_(find_emitting_rectangles(*data_, kMostRectangles)),
+      other_emitted_(light_of_other_emitters()),
       solver_{IndirectSolver(*data_), IndirectSolver(*data_)},
       pictures_(*data_, *engine_.parts().tracer),
       reference_(std::move(reference)),
       make_probes_(std::move(make_probes)) {
   for (auto& values : indirect_) values.resize(data_->patches.size());
   for (auto& values : reflected_) values.resize(data_->patches.size());
+}
+
+std::vector<Float3> LitScene::light_of_other_emitters() {
+  if (rectangles_.lamps.empty()) return emitted_;
+  if (!rectangles_.leave_any(*data_)) return {};
+  engine_.parts().compute_direct(rectangles_.lamps, {});
+  std::vector<Float3> rest = emitted_;
+  for (std::size_t i = 0; i < rest.size(); ++i) {
+    const glm::vec3 light = to_glm(emitted_[i]) - to_glm(engine_.direct_irradiance()[i]);
+    rest[i] = to_float3(glm::max(light, glm::vec3(0)));
+  }
+  return rest;
 }
 
 void LitScene::relight(std::span<const Light> lights, const Sky& sky,
@@ -84,11 +104,13 @@ LightInAir LitScene::light_in_air(const Float3& position, std::span<const Float3
   return light;
 }
 
-std::vector<glm::vec3> LitScene::first_flight_at_vertices(const Sky& sky) const {
+std::vector<glm::vec3> LitScene::first_flight_at_vertices(const Sky& sky,
+                                                          bool draws_emitter_lamps) const {
+  const std::span<const Float3> emitted = draws_emitter_lamps ? other_emitted_ : emitted_;
   std::vector<glm::vec3> value(data_->patches.size());
   for (std::size_t i = 0; i < value.size(); ++i) {
     value[i] = to_glm(sky_irradiance(*data_, sky, i));
-    if (!emitted_.empty()) value[i] += to_glm(emitted_[i]);
+    if (!emitted.empty()) value[i] += to_glm(emitted[i]);
   }
   return reconstruct_at_vertices(data_->mesh, value);
 }

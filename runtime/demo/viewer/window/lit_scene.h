@@ -11,6 +11,7 @@
 #include "rebounce/engine.h"
 #include "rebounce/sky.h"
 #include "runtime/demo/motion/indirect_solver.h"
+#include "runtime/demo/shading/emitting_rectangles.h"
 #include "runtime/demo/viewer/gl/gpu_scene.h"
 #include "runtime/demo/viewer/window/viewer_setup.h"
 
@@ -44,14 +45,18 @@ class LitScene {
   std::span<const Float3> direct_light(std::span<const Light> lights, const Sky& sky,
                                        StageTimes& times);
 
+  /// Emitting surface that a picture may draw as lamps.
+  std::span<const Light> emitter_lamps() const { return rectangles_.lamps; }
+
   /// F M_e [n] in lx, what arrives directly from emitters; empty if there are none.
   std::span<const Float3> emitted_irradiance() const { return emitted_; }
 
   /// H [n] in lx of the last frame.
   std::span<const Float3> indirect(Side side) const { return indirect_[index(side)]; }
 
-  /// The direct light of sky and emitters at the vertices [v], lx.
-  std::vector<glm::vec3> first_flight_at_vertices(const Sky& sky) const;
+  /// The direct light of sky and emitters at the vertices [v], lx; without that of emitter_lamps()
+  /// if these are drawn.
+  std::vector<glm::vec3> first_flight_at_vertices(const Sky& sky, bool draws_emitter_lamps) const;
   std::vector<glm::vec3> bounced_at_vertices(Side side) const;
 
   /// The irradiance at `position` on surfaces with these unit normals, from the probes around it
@@ -79,10 +84,13 @@ class LitScene {
  private:
   static std::size_t index(Side side) { return static_cast<std::size_t>(side); }
   const LightProbes& probes();
+  std::vector<Float3> light_of_other_emitters();
 
   std::shared_ptr<const TransferData> data_;
   Engine engine_;
   std::vector<Float3> emitted_;  // F M_e, lx, or none
+  EmittingRectangles rectangles_;
+  std::vector<Float3> other_emitted_;  // of what is no rectangle, lx, or none
   std::array<IndirectSolver, kSideCount> solver_;
   std::array<std::vector<Float3>, kSideCount> indirect_;
   std::array<std::vector<Float3>, kSideCount> reflected_;  // B - M_e, lx

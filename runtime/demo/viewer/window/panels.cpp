@@ -316,6 +316,9 @@ void Panels::draw_view(ViewerState& state, const FrameDrawer& frame) const {
   ImGui::SliderFloat("exposure", &state.exposure, -16, 16, "%+.1f EV",
                      ImGuiSliderFlags_AlwaysClamp);
   if (ImGui::Button("Find exposure")) state.wants_exposure = true;
+  if (!frame.scene().emitter_lamps().empty()) {
+    ImGui::Checkbox("shadow maps of emitters", &state.draws_emitter_lamps);
+  }
   if (state.show != Show::kError) return;
   if (!frame.scene().has_reference()) {
     ImGui::TextWrapped(

@@ -89,6 +89,7 @@ void run_viewer(const std::shared_ptr<const TransferData>& data, const ViewerSet
   Controls controls(drawer.scene(), drawer.bounds());
   Panels panels;
   ViewerState state = begin(setup);
+  state.draws_emitter_lamps = !window.draws_on_processor();
   while (keep_open() && window.begin_frame()) {
     controls.update(state);
     if (state.playing) state.time += ImGui::GetIO().DeltaTime;

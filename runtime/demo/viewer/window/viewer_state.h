@@ -109,7 +109,8 @@ struct ViewerState {
   bool is_split;
   float time = 0;  ///< seconds
   bool playing = true;
-  bool wants_exposure = false;  ///< compute the exposure again
+  bool draws_emitter_lamps = true;  ///< LitScene::emitter_lamps
+  bool wants_exposure = false;      ///< compute the exposure again
   bool shows_panels = true;
   bool shows_spheres = true;
   std::size_t selected = 0;  ///< selected lamp

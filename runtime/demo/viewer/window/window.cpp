@@ -6,7 +6,10 @@
 #include <backends/imgui_impl_opengl3.h>
 #include <imgui.h>
 
+#include <string_view>
+
 #include "rebounce/error.h"
+#include "runtime/demo/viewer/gl/gl_objects.h"
 
 namespace rebounce {
 namespace {
@@ -58,6 +61,12 @@ bool Window::begin_frame() {
   ImGui_ImplGlfw_NewFrame();
   ImGui::NewFrame();
   return glfwWindowShouldClose(window_) == GLFW_FALSE;
+}
+
+bool Window::draws_on_processor() const {
+  const auto* name = reinterpret_cast<const char*>(glGetString(GL_RENDERER));
+  const std::string_view renderer = name != nullptr ? name : "";
+  return renderer.starts_with("llvmpipe") || renderer.starts_with("softpipe");
 }
 
 void Window::end_frame() {

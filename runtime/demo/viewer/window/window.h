@@ -25,6 +25,9 @@ class Window {
   int width() const { return width_; }    ///< of the picture, pixels
   int height() const { return height_; }  ///< of the picture, pixels
 
+  /// Whether Mesa draws in software.
+  bool draws_on_processor() const;
+
  private:
   GLFWwindow* window_ = nullptr;
   int width_ = 0, height_ = 0;
