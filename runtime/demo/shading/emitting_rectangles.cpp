@@ -38,9 +38,10 @@ std::vector<Triangles> even_pieces(const TransferData& data) {
   Triangles emitting;
   for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t) {
     const std::uint32_t patch = mesh.triangle_patch[t];
+    if (patch == kNone || !emits(data, patch)) continue;
     const Material& material = data.materials[mesh.triangle_material[t]];
     const bool is_even = material.emissive_texture == kNone && mesh.opacity.of_triangle(t).empty();
-    if (patch != kNone && emits(data, patch) && is_even) emitting.push_back(t);
+    if (is_even) emitting.push_back(t);
   }
   DisjointSets sets(emitting.size());
   std::map<std::tuple<Float3, bool, std::uint32_t>, std::uint32_t> first_at;
