@@ -9,7 +9,6 @@
 #include "bench/reference/compare_receivers.h"
 #include "bench/reference/scene_key_light.h"
 #include "bench/support/input.h"
-#include "bench/support/named_quality.h"
 #include "bench/support/program.h"
 #include "bench/truth/error_causes.h"
 #include "bench/truth/error_tables.h"
@@ -40,10 +39,6 @@ struct Options {
   reference::PatchComparisonSettings patch_comparison;
   bench::CommonOptions common;
 };
-
-FormFactorQuality quality_named(const std::string& name) {
-  return std::ranges::find(bench::kQualities, name, &bench::NamedQuality::name)->quality;
-}
 
 /// One row of the result.
 struct Row {
@@ -239,7 +234,7 @@ void add_options(CLI::App& app, Options& options) {
       ->check(CLI::Range(1, 4096))
       ->capture_default_str();
   std::vector<std::string> qualities;
-  for (const bench::NamedQuality& q : bench::kQualities) qualities.emplace_back(q.name);
+  for (const NamedQuality& q : kQualities) qualities.emplace_back(q.name);
   bench::add_choice_option(app, "--form-factor-quality", options.quality, qualities,
                            "Quality of the form factors");
   app.add_option("--seed", patches.seed, "Of all that is random")->capture_default_str();

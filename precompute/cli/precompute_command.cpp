@@ -168,11 +168,6 @@ std::vector<std::string> split_lists(const std::vector<std::string>& lists) {
   return entries;
 }
 
-FormFactorQuality quality_named(std::string_view name) {
-  if (name == "low") return FormFactorQuality::kLow;
-  return name == "high" ? FormFactorQuality::kHigh : FormFactorQuality::kDefault;
-}
-
 /// The names in a table of them.
 std::vector<std::string> names_of(const auto& table) {
   std::vector<std::string> names;
@@ -321,7 +316,7 @@ void add_form_factor_options(CLI::App& command, PrecomputeOptions& chosen) {
           "--quality", chosen.quality,
           "Accuracy of the form factors: default agrees with closed forms to 0.5 %, high to "
           "0.1 % and takes ten times as long")
-      ->check(CLI::IsMember({"low", "default", "high"}))
+      ->check(CLI::IsMember(names_of(kQualities)))
       ->capture_default_str();
   command
       .add_option(

@@ -83,11 +83,6 @@ void write(const ViewFactorOptions& chosen, const std::string& format, const Vie
   if (format == "u-dales") write_u_dales(chosen.output, chosen.case_number, factors);
 }
 
-FormFactorQuality quality_of(const std::string& name) {
-  if (name == "low") return FormFactorQuality::kLow;
-  return name == "high" ? FormFactorQuality::kHigh : FormFactorQuality::kDefault;
-}
-
 void run(const ViewFactorOptions& chosen, const CommonOptions& options) {
   const auto begin = std::chrono::steady_clock::now();
   const std::string format = format_of(chosen);
@@ -102,7 +97,7 @@ void run(const ViewFactorOptions& chosen, const CommonOptions& options) {
     ProgressBar bar(!options.quiet);
     factors = compute_view_factors(
         facets,
-        {.quality = quality_of(chosen.quality), .seed = chosen.seed, .closed = chosen.closed},
+        {.quality = quality_named(chosen.quality), .seed = chosen.seed, .closed = chosen.closed},
         [&](double done) { return bar.update("view factors", done); });
     if (chosen.exchange) {
       exchange = compute_exchange_factors(

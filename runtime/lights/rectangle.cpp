@@ -126,11 +126,16 @@ glm::vec3 highest_point(const PreparedLight& lamp, const glm::vec3& normal) {
   return lamp.position + up * lamp.side + other_up * lamp.other_side;
 }
 
-glm::vec3 place(const PreparedLight& lamp, std::uint32_t k, std::uint32_t) {
-  // The R2 sequence (M. Roberts, 2018), starting at the centre.
-  const glm::dvec2 at =
-      0.5 + static_cast<double>(k) * glm::dvec2(0.7548776662466927, 0.5698402909980532);
-  return from_middle(lamp, 2.0F * glm::vec2(glm::fract(at)) - 1.0F);
+// The Hammersley set (J. M. Hammersley, 1960): of a power of two of places each half, quarter and so
+// on of either side has its share, so that their middle is that of the lamp.
+glm::vec3 place(const PreparedLight& lamp, std::uint32_t k, std::uint32_t count) {
+  const float half = 0.5F / static_cast<float>(count);
+  glm::vec2 at(static_cast<float>(k) / static_cast<float>(count), 0);
+  float digit = 0.5F;
+  for (std::uint32_t rest = k; rest > 0; rest /= 2, digit /= 2) {
+    if (rest % 2 == 1) at.y += digit;
+  }
+  return from_middle(lamp, 2.0F * (at + half) - 1.0F);
 }
 
 LampMesh mesh(const PreparedLight& lamp) {

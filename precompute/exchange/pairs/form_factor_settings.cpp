@@ -1,9 +1,20 @@
 #include "precompute/exchange/pairs/form_factor_settings.h"
 
+#include <algorithm>
+#include <string>
+
 #include "precompute/exchange/pairs/shadow_rays.h"
 #include "rebounce/error.h"
 
 namespace rebounce {
+
+FormFactorQuality quality_named(std::string_view name) {
+  const auto* const named = std::ranges::find(kQualities, name, &NamedQuality::name);
+  if (named == kQualities.end()) {
+    throw Error("there is no quality \"" + std::string(name) + "\"");
+  }
+  return named->quality;
+}
 
 FormFactorSettings with_quality(FormFactorQuality quality, FormFactorSettings settings) {
   const FormFactorSettings standard;

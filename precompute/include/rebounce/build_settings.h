@@ -2,11 +2,13 @@
 
 // All settings of the offline stage.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "rebounce/lights.h"
@@ -57,6 +59,21 @@ enum class FormFactorQuality : std::uint8_t {
   kDefault,  ///< view factors agree with closed forms to 0.5 %
   kHigh,     ///< to 0.1 %: about ten times slower
 };
+
+struct NamedQuality {
+  FormFactorQuality quality;
+  const char* name;  ///< on the command line and in Python
+};
+
+/// All qualities, from the fastest on.
+inline constexpr std::array<NamedQuality, 3> kQualities = {{
+    {FormFactorQuality::kLow, "low"},
+    {FormFactorQuality::kDefault, "default"},
+    {FormFactorQuality::kHigh, "high"},
+}};
+
+/// The quality of that name. Throws Error if there is none.
+FormFactorQuality quality_named(std::string_view name);
 
 /// `settings` with what a quality decides; seed and links stay.
 ///

@@ -46,9 +46,8 @@ py::dict view_factors(const Array<double>& vertices, const Array<std::uint32_t>&
                       const Array<std::uint32_t>& corners, const Array<std::uint8_t>& obstructs,
                       const std::string& quality, bool closed, std::uint64_t seed,
                       const py::object& progress) {
-  ViewFactorSettings settings{.seed = seed, .closed = closed};
-  if (quality == "low") settings.quality = FormFactorQuality::kLow;
-  if (quality == "high") settings.quality = FormFactorQuality::kHigh;
+  const ViewFactorSettings settings{
+      .quality = quality_named(quality), .seed = seed, .closed = closed};
   const Facets facets = facets_from(vertices, begin, corners, obstructs);
   LongWork work(progress);
   return arrays_of(work.run([&] {

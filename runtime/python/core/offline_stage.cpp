@@ -84,13 +84,6 @@ Scene make_scene(const Array<float>& vertices, const Array<std::uint32_t>& trian
   return scene;
 }
 
-FormFactorQuality quality_named(const std::string& name) {
-  if (name == "low") return FormFactorQuality::kLow;
-  if (name == "default") return FormFactorQuality::kDefault;
-  if (name == "high") return FormFactorQuality::kHigh;
-  throw py::value_error("quality is \"low\", \"default\" or \"high\", not \"" + name + "\"");
-}
-
 BuildSettings settings_of(const py::dict& options) {
   BuildSettings settings;
   for (const auto& [key, value] : options) {

@@ -300,6 +300,8 @@ def precompute(
     """
     if form_factors not in (None, "compressed", "exact"):
         raise ValueError(f'form_factors is None, "compressed" or "exact", not {form_factors!r}')
+    if quality not in ("low", "default", "high"):
+        raise ValueError(f'quality is "low", "default" or "high", not {quality!r}')
     if operator not in ("hierarchical", "low-rank", "dense"):
         raise ValueError(f'operator is "hierarchical", "low-rank" or "dense", not {operator!r}')
     patches, seed = _whole(patches, "patches"), _whole(seed, "seed")
