@@ -126,8 +126,8 @@ glm::vec3 highest_point(const PreparedLight& lamp, const glm::vec3& normal) {
   return lamp.position + up * lamp.side + other_up * lamp.other_side;
 }
 
-// The Hammersley set (J. M. Hammersley, 1960): of a power of two of places each half, quarter and so
-// on of either side has its share, so that their middle is that of the lamp.
+// The Hammersley set (J. M. Hammersley, 1960): of a power of two of places each half, quarter and
+// so on of either side has its share, so that their middle is that of the lamp.
 glm::vec3 place(const PreparedLight& lamp, std::uint32_t k, std::uint32_t count) {
   const float half = 0.5F / static_cast<float>(count);
   glm::vec2 at(static_cast<float>(k) / static_cast<float>(count), 0);
