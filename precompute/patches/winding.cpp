@@ -8,13 +8,13 @@
 #include <map>
 #include <utility>
 
-#include "transfer/base/disjoint_sets.h"
 #include "precompute/base/edge_table.h"
 #include "precompute/import/import_gltf.h"
 #include "precompute/patches/welded_positions.h"
 #include "precompute/sampling/hemisphere_rays.h"
 #include "runtime/rays/ray_tracer.h"
 #include "runtime/rays/triangle.h"
+#include "transfer/base/disjoint_sets.h"
 
 namespace rebounce {
 namespace {

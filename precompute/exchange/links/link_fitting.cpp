@@ -5,12 +5,12 @@
 #include <utility>
 #include <vector>
 
-#include "transfer/base/disjoint_sets.h"
 #include "precompute/exchange/links/affine_links.h"
 #include "precompute/exchange/links/link_choice.h"
 #include "precompute/exchange/links/pair_sums.h"
 #include "precompute/patches/cluster_tree.h"
 #include "rebounce/error.h"
+#include "transfer/base/disjoint_sets.h"
 
 namespace rebounce {
 namespace {
