@@ -6,6 +6,7 @@
 #include <map>
 #include <numbers>
 #include <optional>
+#include <set>
 #include <span>
 #include <tuple>
 
@@ -112,6 +113,18 @@ std::optional<Light> rectangle_of(const DisplayMesh& mesh, std::span<const std::
   return lamp;
 }
 
+/// Whether the patches of these triangles have no others.
+bool are_whole_patches(const TransferData& data, std::span<const std::uint32_t> triangles) {
+  double shown = 0, whole = 0;
+  std::set<std::uint32_t> patches;
+  for (const std::uint32_t t : triangles) {
+    shown += area_of(corners_of(data.mesh, t));
+    patches.insert(data.mesh.triangle_patch[t]);
+  }
+  for (const std::uint32_t patch : patches) whole += static_cast<double>(data.patches.area[patch]);
+  return std::abs(whole - shown) < kTolerance * shown;
+}
+
 double lumens_of(const Light& lamp) {
   return luminance(to_glm(lamp.color)) * lamp.intensity * lamp.size[0] * lamp.size[1];
 }
@@ -135,7 +148,7 @@ EmittingRectangles find_emitting_rectangles(const TransferData& data, std::size_
       const float difference = glm::length(own - to_glm(exitance));
       return difference > static_cast<float>(kTolerance) * glm::length(to_glm(exitance));
     };
-    if (std::ranges::any_of(piece, is_other)) continue;
+    if (std::ranges::any_of(piece, is_other) || !are_whole_patches(data, piece)) continue;
     std::optional<Light> lamp = rectangle_of(mesh, piece, exitance);
     if (lamp) found.emplace_back(std::move(*lamp), std::move(piece));
   }

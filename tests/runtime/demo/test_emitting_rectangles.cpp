@@ -127,6 +127,13 @@ TEST(EmittingRectangles, NothingElseIsTakenForOne) {
     EXPECT_EQ(found_in(a_picture), 0U);
   }
   {
+    SceneBuilder a_part;  // of a patch
+    const std::uint32_t lamp = a_part.add_material({0, 0, 0}, {10, 10, 10});
+    a_part.add_rectangle(rectangle({0, 0, 0}, {1, 0, 0}, {0, 1, 0}), lamp);
+    a_part.data().patches.area[0] *= 2;
+    EXPECT_EQ(found_in(a_part), 0U);
+  }
+  {
     SceneBuilder uneven;
     const std::uint32_t lamp = uneven.add_material({0, 0, 0}, {10, 10, 10});
     uneven.add_rectangle(rectangle({0, 0, 0}, {1, 0, 0}, {0, 1, 0}), lamp);
