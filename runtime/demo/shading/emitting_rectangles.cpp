@@ -104,7 +104,8 @@ std::optional<Light> rectangle_of(const DisplayMesh& mesh, std::span<const std::
   if (!is_flat || !is_right || !is_filled) return std::nullopt;
   Light lamp;
   lamp.type = LightType::kRectangle;
-  lamp.position = to_float3(glm::vec3(plane.middle + near * plane.normal));  // shades not itself
+  // In front of the surface, which would shade a lamp that lies in it.
+  lamp.position = to_float3(glm::vec3(plane.middle + near * plane.normal));
   lamp.direction = to_float3(glm::vec3(plane.normal));
   lamp.color = to_float3(to_glm(exitance) / std::ranges::max(exitance));
   lamp.intensity = std::ranges::max(exitance) / std::numbers::pi_v<float>;

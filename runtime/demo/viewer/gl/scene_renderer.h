@@ -26,7 +26,7 @@ struct FrameSettings {
   float exposure = 0;            ///< stops
   std::optional<float> split{};  ///< fraction of the width that shows the first side; unset: all
   std::span<const Light> lights{};
-  bool draws_emitter_lamps = true;  ///< of the renderer
+  bool draws_emitter_lamps = false;  ///< as in update_shadows
   Sky sky{};
 };
 
