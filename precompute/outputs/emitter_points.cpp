@@ -4,16 +4,13 @@
 #include <map>
 #include <span>
 
+#include "runtime/lights/emitting_material.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/sampling.h"
 #include "runtime/rays/triangle.h"
 
 namespace rebounce {
 namespace {
-
-bool emits(const TransferData& data, std::uint32_t patch) {
-  return data.patches.emitted_exitance[patch] != Float3{0, 0, 0};
-}
 
 /// Points at equal steps of area over all `triangles`, one triangle after the other.
 std::vector<EmitterPoint> spread(const DisplayMesh& mesh, std::span<const std::uint32_t> triangles,
@@ -44,7 +41,7 @@ std::vector<EmitterPoints> spread_over_emitters(const TransferData& data, int mo
   std::map<std::uint32_t, std::vector<std::uint32_t>> triangles;
   for (std::uint32_t t = 0; t < data.mesh.triangle_patch.size(); ++t) {
     const std::uint32_t patch = data.mesh.triangle_patch[t];
-    if (patch != kNone && emits(data, patch)) triangles[patch].push_back(t);
+    if (patch != kNone && emits(data.patches, patch)) triangles[patch].push_back(t);
   }
   if (triangles.empty()) return {};
   const int count = std::clamp(most / static_cast<int>(triangles.size()), 1, most_each);

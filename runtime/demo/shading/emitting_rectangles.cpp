@@ -11,6 +11,7 @@
 #include <tuple>
 
 #include "runtime/demo/image/srgb.h"
+#include "runtime/lights/emitting_material.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/triangle.h"
 #include "transfer/base/disjoint_sets.h"
@@ -29,17 +30,13 @@ struct Plane {
   double area = 0;
 };
 
-bool emits(const TransferData& data, std::uint32_t patch) {
-  return data.patches.emitted_exitance[patch] != Float3{0, 0, 0};
-}
-
 /// Triangles of an even luminance, in pieces that hang together and have one material and one side.
 std::vector<Triangles> even_pieces(const TransferData& data) {
   const DisplayMesh& mesh = data.mesh;
   Triangles emitting;
   for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t) {
     const std::uint32_t patch = mesh.triangle_patch[t];
-    if (patch == kNone || !emits(data, patch)) continue;
+    if (patch == kNone || !emits(data.patches, patch)) continue;
     const Material& material = data.materials[mesh.triangle_material[t]];
     const bool is_even = material.emissive_texture == kNone && mesh.opacity.of_triangle(t).empty();
     if (is_even) emitting.push_back(t);
@@ -134,7 +131,7 @@ double lumens_of(const Light& lamp) {
 
 bool EmittingRectangles::leave_any(const TransferData& data) const {
   for (std::uint32_t p = 0; p < is_lamp.size(); ++p) {
-    if (emits(data, p) && !is_lamp[p]) return true;
+    if (emits(data.patches, p) && !is_lamp[p]) return true;
   }
   return false;
 }
