@@ -2,6 +2,7 @@
 
 #include <omp.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 
@@ -15,15 +16,15 @@ namespace rebounce {
 /// early, so iterations that find stopped() do nothing.
 class ParallelProgress {
  public:
-  /// `count` iterations; `progress` must outlive it.
+  /// `count` iterations, or other units of their work; `progress` must outlive it.
   ParallelProgress(const Progress& progress, std::size_t count)
-      : progress_(progress), count_(count) {}
+      : progress_(progress), count_(std::max<std::size_t>(count, 1)) {}
 
   bool stopped() const { return stop_; }
 
-  /// Counts one finished iteration.
-  void advance() {
-    const double done = static_cast<double>(++done_);
+  /// Counts a finished iteration, of `units`.
+  void advance(std::size_t units = 1) {
+    const double done = static_cast<double>(done_ += units);
     if (progress_ && omp_get_thread_num() == 0 && !progress_(done / static_cast<double>(count_))) {
       stop_ = true;
     }

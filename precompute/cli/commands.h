@@ -1,10 +1,19 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
 
 #include "precompute/cli/console.h"
 
 namespace rebounce::cli {
+
+/// What an option may be: the names in a table whose entries have one each.
+std::vector<std::string> option_names(const auto& table) {
+  std::vector<std::string> names;
+  for (const auto& entry : table) names.emplace_back(entry.name);
+  return names;
+}
 
 // Each function adds its sub-command to `app`. The command runs when the command line is parsed.
 // `options` must outlive `app`.

@@ -168,13 +168,6 @@ std::vector<std::string> split_lists(const std::vector<std::string>& lists) {
   return entries;
 }
 
-/// The names in a table of them.
-std::vector<std::string> names_of(const auto& table) {
-  std::vector<std::string> names;
-  for (const auto& entry : table) names.emplace_back(entry.name);
-  return names;
-}
-
 /// --receivers-at. Files for pages have none where it is left open.
 void choose_receivers(const PrecomputeOptions& chosen, ReceiverRowSettings& rows) {
   const bool for_web = chosen.reader == "web", is_open = chosen.receivers_at == kWhereNeeded;
@@ -316,7 +309,7 @@ void add_form_factor_options(CLI::App& command, PrecomputeOptions& chosen) {
           "--quality", chosen.quality,
           "Accuracy of the form factors: default agrees with closed forms to 0.5 %, high to "
           "0.1 % and takes ten times as long")
-      ->check(CLI::IsMember(names_of(kQualities)))
+      ->check(CLI::IsMember(option_names(kQualities)))
       ->capture_default_str();
   command
       .add_option(
@@ -345,7 +338,7 @@ void add_operator_options(CLI::App& command, PrecomputeOptions& chosen) {
           "--operator", chosen.operator_kind,
           "Kind of the operator: hierarchical, to a tolerance; low-rank, of one rank; or dense, "
           "exact to rounding and n² numbers")
-      ->check(CLI::IsMember(names_of(kOperatorKinds)))
+      ->check(CLI::IsMember(option_names(kOperatorKinds)))
       ->capture_default_str();
   command
       .add_option("--rank", chosen.settings.rank,
@@ -363,7 +356,7 @@ void add_operator_options(CLI::App& command, PrecomputeOptions& chosen) {
           "Numbers of the operator: f32, f16 for half the bytes, or, hierarchical only, "
           "integers: q8 for a third of the bytes; by default f32 for a dense operator, q8 for a "
           "hierarchical one, f16 for others")
-      ->check(CLI::IsMember(names_of(kOfferedPrecisions)));
+      ->check(CLI::IsMember(option_names(kOfferedPrecisions)));
   command
       .add_option("--receivers", chosen.receivers,
                   "Surfaces that get indirect light; for others none is stored. A list of names of "

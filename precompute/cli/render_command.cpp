@@ -75,7 +75,8 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
   settings.exposure = chosen.exposure;
   check_can_write(chosen.output);
   LightSetup setup;
-  const bool needs_no_light = settings.show == Show::kPatches || chosen.key_light;
+  const bool needs_no_light =
+      chosen.key_light || (settings.show == Show::kPatches && chosen.lights.empty());
   const auto data = needs_no_light
                         ? std::make_shared<const TransferData>(load_transfer_file(chosen.file))
                         : load_lit_scene(chosen.file, chosen.lights, setup);

@@ -31,7 +31,11 @@ std::string format_of(const ViewFactorOptions& chosen) {
   if (!chosen.format.empty()) return chosen.format;
   const std::string extension = std::filesystem::path(chosen.output).extension().string();
   if (extension == ".npz" || extension == ".mtx") return extension.substr(1);
-  return "u-dales";
+  if (extension.empty() || std::filesystem::is_directory(chosen.output)) return "u-dales";
+  throw Error(
+      fmt::format("{}: no format has names that end in {}; end it in .npz or .mtx, or give "
+                  "--format u-dales for a folder",
+                  chosen.output, extension));
 }
 
 /// The emissivities [n]: one number for all, a file of numbers, or those of the geometry.
@@ -178,7 +182,7 @@ void add_view_factors_command(CLI::App& app, const CommonOptions& options) {
       ->add_option("--quality", chosen->quality,
                    "Accuracy: default agrees with closed forms to 0.5 %, high to 0.1 % and takes "
                    "ten times as long")
-      ->check(CLI::IsMember({"low", "default", "high"}))
+      ->check(CLI::IsMember(option_names(kQualities)))
       ->capture_default_str();
   command
       ->add_option("--threshold", chosen->threshold,

@@ -1,15 +1,14 @@
 #include "precompute/patches/element_clusters.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-
 #include <numeric>
 
 #include "precompute/patches/cluster_merging.h"
 #include "precompute/patches/element_blocks.h"
 #include "precompute/patches/element_neighbours.h"
 #include "runtime/rays/float3_glm.h"
+#include "transfer/base/disjoint_sets.h"
 
 namespace rebounce {
 namespace {
@@ -94,29 +93,22 @@ class ElementMerging {
   /// Finds the length of the connected piece of the mesh that each element belongs to.
   void measure_pieces(const Pairs& edges) {
     const Elements& elements = scene_.elements;
-    std::vector<std::uint32_t> piece(elements.size());
-    std::iota(piece.begin(), piece.end(), 0U);
-    const auto find = [&](std::uint32_t e) {
-      while (piece[e] != e) e = piece[e] = piece[piece[e]];
-      return e;
-    };
-    for (const auto& [a, b] : edges) {
-      const std::uint32_t low = std::min(find(a), find(b)), high = std::max(find(a), find(b));
-      piece[high] = low;
-    }
-    std::vector<std::array<glm::vec3, 2>> box;  // of each piece, by the number of its first element
-    std::vector<std::uint32_t> number(elements.size());
+    DisjointSets pieces(elements.size());
+    for (const auto& [a, b] : edges) pieces.join(a, b);
+    // The box around each piece, by the element that represents it.
+    std::vector<glm::vec3> low(elements.size()), high(elements.size());
     for (std::uint32_t e = 0; e < elements.size(); ++e) {
-      if (find(e) == e) {
-        number[e] = static_cast<std::uint32_t>(box.size());
-        box.push_back({elements.low(e), elements.high(e)});
-      }
-      number[e] = number[find(e)];
-      box[number[e]][0] = glm::min(box[number[e]][0], elements.low(e));
-      box[number[e]][1] = glm::max(box[number[e]][1], elements.high(e));
+      low[e] = elements.low(e);
+      high[e] = elements.high(e);
     }
-    for (const std::uint32_t n : number) {
-      scene_.piece_length.push_back(glm::distance(box[n][0], box[n][1]));
+    for (std::uint32_t e = 0; e < elements.size(); ++e) {
+      const std::uint32_t piece = pieces.find(e);
+      low[piece] = glm::min(low[piece], elements.low(e));
+      high[piece] = glm::max(high[piece], elements.high(e));
+    }
+    for (std::uint32_t e = 0; e < elements.size(); ++e) {
+      const std::uint32_t piece = pieces.find(e);
+      scene_.piece_length.push_back(glm::distance(low[piece], high[piece]));
     }
   }
 

@@ -16,6 +16,7 @@
 #include "precompute/patches/welded_positions.h"
 #include "rebounce/error.h"
 #include "runtime/rays/float3_glm.h"
+#include "runtime/rays/triangle.h"
 
 namespace rebounce {
 namespace {
@@ -133,20 +134,11 @@ class PatchModelBuilder {
     }
   }
 
-  std::array<glm::dvec3, 3> corners(std::uint32_t t) const {
-    const DisplayMesh& mesh = model_.mesh;
-    const auto [a, b, c] = mesh.triangle[t];
-    return {to_dvec3(mesh.position[a]), to_dvec3(mesh.position[b]), to_dvec3(mesh.position[c])};
-  }
-
-  double area_of(std::uint32_t t) const {
-    const auto [p, q, r] = corners(t);
-    return 0.5 * glm::length(glm::cross(q - p, r - p));
-  }
+  TriangleCorners corners(std::uint32_t t) const { return corners_of(model_.mesh, t); }
 
   /// Texture samples of a display triangle: the triangles of a patch share its samples.
   int sample_count(std::uint32_t t) const {
-    const double part = area_of(t) / patch_area_;
+    const double part = area_of(corners(t)) / patch_area_;
     return static_cast<int>(
         std::min(std::ceil(part * kMostTextureSamples), 1.0 * kMostTextureSamples));
   }
@@ -178,7 +170,7 @@ class PatchModelBuilder {
   double mean_patch_area() const {
     if (settings_.patch_count == 0) return std::pow(static_cast<double>(settings_.patch_size), 2);
     double area = 0;
-    for (const std::uint32_t t : element_triangle_) area += area_of(t);
+    for (const std::uint32_t t : element_triangle_) area += area_of(corners(t));
     return area / static_cast<double>(settings_.patch_count);
   }
 
@@ -205,26 +197,26 @@ class PatchModelBuilder {
 #pragma omp parallel for schedule(dynamic, 256)
     for (std::size_t e = 0; e < count; ++e) {
       const std::uint32_t t = element_triangle_[e];
-      const auto [p, q, r] = corners(t);
-      const glm::dvec3 cross = glm::cross(q - p, r - p);
+      const TriangleCorners corner = corners(t);
+      const glm::dvec3 area = area_vector(corner);
       const auto [a, b, c] = model_.mesh.triangle[t];
       elements_.triangle[e] = surface_of_[t];
       elements_.corner[e] = {position[a], position[b], position[c]};
-      elements_.normal[e] = to_float3(glm::normalize(cross));
+      elements_.normal[e] = to_float3(glm::normalize(area));
       elements_.area[e] =
-          static_cast<float>(0.5 * glm::length(cross) * model_.mesh.opacity.stopping_part(t));
+          static_cast<float>(glm::length(area) * model_.mesh.opacity.stopping_part(t));
       elements_.reflectance[e] = mean_reflectance(t);
       const bool small = elements_.area[e] <= kSmallElement * patch_area_;
       elements_.covered[e] = static_cast<float>(covered_part(
-          {p, q, r}, tracer, kCoverHeight * std::sqrt(patch_area_), small ? 1 : kCoverPoints));
+          corner, tracer, kCoverHeight * std::sqrt(patch_area_), small ? 1 : kCoverPoints));
       if (settings_.patch_size == 0) {
         const double seen =
-            small ? 1 : density_weight(hemisphere_visibility({p, q, r}, tracer, kSightRays, e));
+            small ? 1 : density_weight(hemisphere_visibility(corner, tracer, kSightRays, e));
         elements_.density_weight[e] =
             static_cast<float>(seen * (1 - kLessCovered * elements_.covered[e]));
       }
       elements_.lamp_light[e] = static_cast<float>(
-          lamp_light_.feature({p, q, r}, tracer, small ? kLampPointsOfSmall : kLampPoints));
+          lamp_light_.feature(corner, tracer, small ? kLampPointsOfSmall : kLampPoints));
       elements_.emits[e] =
           std::ranges::any_of(mean_exitance(t), [](float m) { return m > 0; }) ? 1 : 0;
     }
@@ -296,11 +288,10 @@ class PatchModelBuilder {
       model_.buried_side_count += kind_[t] == SideKind::kBuried ? 1 : 0;
       if (kind_[t] != SideKind::kCovered) continue;
       ++model_.covered_side_count;
-      const auto [p, q, r] = corners(t);
+      const TriangleCorners p = corners(t);
       find_coincident_sides(
-          tracer, to_float3((p + q + r) / 3.0), to_float3(glm::normalize(glm::cross(q - p, r - p))),
-          surface_of_[t], [&](std::uint32_t o) { return mesh.back_triangle[o] != kNone; }, hits,
-          sides);
+          tracer, to_float3((p[0] + p[1] + p[2]) / 3.0), to_float3(front_normal(p)), surface_of_[t],
+          [&](std::uint32_t o) { return mesh.back_triangle[o] != kNone; }, hits, sides);
       for (const CoincidentSide& side : sides) {
         const std::uint32_t other = side.front ? side.triangle : mesh.back_triangle[side.triangle];
         if (!side.same_way || mesh.triangle_patch[other] == kNone) continue;

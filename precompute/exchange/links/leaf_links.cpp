@@ -63,16 +63,18 @@ std::uint64_t LeafLinks::measure(const PairExchange& exchange, int probe_rays,
                                  const Progress& progress) {
   const Ranks ranks;
   const std::size_t rows = begin_.size() - 1;
-  ParallelProgress loop(progress, rows);
+  std::size_t pairs = 0;
+  for (std::uint32_t i = 0; i < rows; ++i) pairs += ranks.makes(i) ? row(i).size() : 0;
+  ParallelProgress loop(progress, pairs);
   std::uint64_t rays = 0;
 #pragma omp parallel reduction(+ : rays)
   {
     Scratch scratch;
 #pragma omp for schedule(dynamic, 4)
-    for (std::size_t i = 0; i < rows; ++i) {
+    for (std::uint32_t i = 0; i < rows; ++i) {
       if (loop.stopped() || !ranks.makes(i)) continue;
-      measure_row(static_cast<std::uint32_t>(i), exchange, probe_rays, scratch);
-      loop.advance();
+      measure_row(i, exchange, probe_rays, scratch);
+      loop.advance(row(i).size());
     }
     rays += scratch.pairs.ray_count;
   }

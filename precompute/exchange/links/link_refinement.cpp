@@ -22,7 +22,10 @@ constexpr double kPlane = 1e-7;
 constexpr std::size_t kPairsInTurn = 64;
 
 // Pairs whose outcomes are held at a time.
-constexpr std::size_t kPairsAtOnce = 1 << 18;
+constexpr std::size_t kPairsAtOnce = 1 << 16;
+
+// To know how much is to be done, one pair for so many nodes is examined of each generation.
+constexpr std::size_t kNodesPerSample = 32;
 
 // A pair that faces in part may get a link if all of it is below this fraction of the allowed
 // error.
@@ -62,7 +65,6 @@ std::vector<LinkRefinement::Candidate> LinkRefinement::take(const Again& again) 
   std::erase_if(links_, [&](const Link& link) {
     if (!again(link)) return false;
     taken.push_back({link.a, link.b, link.view});
-    done_ -= part_of_pairs(taken.back());
     return true;
   });
   return taken;
@@ -75,7 +77,6 @@ void LinkRefinement::refine(double epsilon, const Progress& progress) {
   if (first) return refine(std::vector<Candidate>{{0, 0, View::kUnknown}}, progress);
   std::vector<Candidate> again =
       take([&](const Link& link) { return link.least_epsilon >= epsilon; });
-  for (const Candidate& pair : empty_) done_ -= part_of_pairs(pair);
   again.insert(again.end(), empty_.begin(), empty_.end());
   empty_.clear();
   refine(std::move(again), progress);
@@ -112,8 +113,16 @@ void LinkRefinement::revise(const std::vector<bool>& doubtful, const Progress& p
 
 double LinkRefinement::forecast(double epsilon, std::size_t sample, const Progress& progress) {
   const double kept_epsilon = std::exchange(epsilon_, epsilon);
-  double count = 0, weight = 1;
-  std::vector<Candidate> generation{{0, 0, View::kUnknown}};
+  const Forecast forecast = this->forecast({{0, 0, View::kUnknown}}, sample, progress);
+  epsilon_ = kept_epsilon;
+  return forecast.links;
+}
+
+LinkRefinement::Forecast LinkRefinement::forecast(std::vector<Candidate> generation,
+                                                  std::size_t sample, const Progress& progress) {
+  const std::uint64_t pairs = candidate_count_, rays = ray_count_;
+  Forecast forecast;
+  double weight = 1;
   std::vector<Outcome> outcomes;
   while (!generation.empty()) {
     if (generation.size() > sample) {
@@ -125,35 +134,40 @@ double LinkRefinement::forecast(double epsilon, std::size_t sample, const Progre
       weight *= step;
     }
     outcomes.assign(generation.size(), {});
+    const std::uint64_t before = work();
     decide(generation, outcomes, progress);
+    forecast.work += weight * static_cast<double>(work() - before);
     std::vector<Candidate> next;
     for (std::size_t k = 0; k < generation.size(); ++k) {
       const Outcome& outcome = outcomes[k];
       if (outcome.kind == Outcome::Kind::kLink) {
         const Link& link = outcome.link;
         const bool leaves = tree_[link.a].is_leaf() && tree_[link.b].is_leaf();
-        if (leaves || link.exchange_area > 0) count += weight;
+        if (leaves || link.exchange_area > 0) forecast.links += weight;
       } else if (outcome.kind != Outcome::Kind::kNothing) {
         append_children(generation[k], outcome, next);
       }
     }
     generation = std::move(next);
   }
-  epsilon_ = kept_epsilon;
-  return count;
+  candidate_count_ = pairs;
+  ray_count_ = rays;
+  return forecast;
 }
 
 void LinkRefinement::add(std::span<const std::pair<std::uint32_t, std::uint32_t>> leaves) {
   std::vector<Candidate> candidates;
   for (const auto& [a, b] : leaves) candidates.push_back({a, b, View::kUnknown});
   const std::size_t known = links_.size();
-  const double done = done_;  // with the hidden links that these pairs are in
   refine(std::move(candidates), {});
-  done_ = done;
   for (Link& link : links().subspan(known)) link.added = true;
 }
 
 void LinkRefinement::refine(std::vector<Candidate> generation, const Progress& progress) {
+  done_ = 0;
+  const std::size_t sample = std::max<std::size_t>(tree_.nodes().size() / kNodesPerSample, 1);
+  const double expected = forecast(generation, sample, progress).work;
+  const std::uint64_t before = work();
   std::vector<Outcome> outcomes;
   std::vector<std::vector<Link>> made;
   while (!generation.empty()) {
@@ -163,6 +177,7 @@ void LinkRefinement::refine(std::vector<Candidate> generation, const Progress& p
       const std::span some =
           std::span(generation).subspan(begin, std::min(kPairsAtOnce, generation.size() - begin));
       outcomes.assign(some.size(), {});
+      done_ = static_cast<double>(work() - before) / expected;
       decide(some, outcomes, progress);
       merge(some, outcomes, links, next);
     }
@@ -329,21 +344,12 @@ void LinkRefinement::merge(std::span<const Candidate> generation,
     const Outcome& outcome = outcomes[k];
     if (outcome.kind == Outcome::Kind::kSplitA || outcome.kind == Outcome::Kind::kSplitB) {
       append_children(pair, outcome, next);
-      continue;
-    }
-    if (outcome.kind == Outcome::Kind::kLink && outcome.link.unoccluded_area > 0) {
+    } else if (outcome.kind == Outcome::Kind::kLink && outcome.link.unoccluded_area > 0) {
       links.push_back(outcome.link);
     } else if (outcome.kind == Outcome::Kind::kLink) {
       empty_.push_back(pair);
     }
-    done_ += part_of_pairs(pair);
   }
-}
-
-/// The fraction of all pairs of points that a pair of nodes holds.
-double LinkRefinement::part_of_pairs(const Candidate& pair) const {
-  const double whole = tree_[0].area * tree_[0].area;
-  return (pair.a == pair.b ? 1 : 2) * tree_[pair.a].area * tree_[pair.b].area / whole;
 }
 
 void LinkRefinement::append_children(const Candidate& pair, const Outcome& outcome,

@@ -95,7 +95,15 @@ class LinkRefinement {
     Link link;
   };
   struct Scratch;
+  /// What refinement does, from samples.
+  struct Forecast {
+    double links = 0, work = 0;
+  };
 
+  Forecast forecast(std::vector<Candidate> generation, std::size_t sample,
+                    const Progress& progress);
+  /// Grows with the time that has been taken.
+  std::uint64_t work() const { return candidate_count_ + ray_count_; }
   void refine(std::vector<Candidate> generation, const Progress& progress);
   template <typename Again>
   std::vector<Candidate> take(const Again& again);
@@ -115,7 +123,6 @@ class LinkRefinement {
   double allowed_squared(const Candidate& pair) const;
   void merge(std::span<const Candidate> generation, const std::vector<Outcome>& outcomes,
              std::vector<Link>& links, std::vector<Candidate>& next);
-  double part_of_pairs(const Candidate& pair) const;
   void append_children(const Candidate& pair, const Outcome& outcome,
                        std::vector<Candidate>& next) const;
   bool needs_all_rays(const Candidate& pair) const;
@@ -131,7 +138,7 @@ class LinkRefinement {
   std::vector<Candidate> empty_;
   /// [nodes] nonzero if a node holds a doubtful patch; empty if none does.
   std::vector<std::uint8_t> doubtful_;
-  double done_ = 0;  ///< fraction of all pairs of points that is settled
+  double done_ = 0;  ///< fraction of the work that is done
   std::uint64_t candidate_count_ = 0, ray_count_ = 0;
 };
 

@@ -62,16 +62,16 @@ void RefinedLinks::refine(double epsilon, const Progress& progress) {
   }
   refinement_.refine(epsilon, part_of(progress, 0.0, 0.4));
   if (target_.empty()) {
-    hemispheres_.trace(part_of(progress, 0.4, 0.5));
+    hemispheres_.trace(part_of(progress, 0.4, 0.42));
     target_ = row_sum_targets(escape(), settings_.hemisphere_rays);
   }
-  measure(epsilon, part_of(progress, 0.5, 0.65));
+  measure(epsilon, part_of(progress, 0.42, 0.76));
   const std::vector<double> ones(target_.size(), 1.0);
   refinement_.revise(
       find_doubtful_rows(gather_links(tree_, links(), ones), target_, kLinkRowSumTolerance),
-      part_of(progress, 0.65, 0.85));
+      part_of(progress, 0.76, 0.82));
   add_seen();
-  measure(epsilon, part_of(progress, 0.85, 1.0));
+  measure(epsilon, part_of(progress, 0.82, 1.0));
 }
 
 /// Measures the links between single patches that are new, and what more rays tell of coarse ones.
@@ -82,10 +82,10 @@ void RefinedLinks::measure(double epsilon, const Progress& progress) {
   const CountedExchange first(geometry.areas(), hemispheres_.rays());
   const std::vector<double> more =
       further_rays(leaves, first, epsilon, hemispheres_.rays(), settings_.hemisphere_rays);
-  if (hemispheres_.trace_further(more, part_of(progress, 0.0, 0.4))) leaves.count(hemispheres_);
+  if (hemispheres_.trace_further(more, part_of(progress, 0.0, 0.15))) leaves.count(hemispheres_);
   const CountedExchange counted(geometry.areas(), hemispheres_.rays());
   const PairExchange exchange(shadow_rays_, tracer_, counted, settings_);
-  measuring_rays_ += leaves.measure(exchange, settings_.probe_rays, part_of(progress, 0.4, 1.0));
+  measuring_rays_ += leaves.measure(exchange, settings_.probe_rays, part_of(progress, 0.15, 1.0));
 }
 
 /// Adds links between single patches that hemisphere rays join although shadow rays between nodes

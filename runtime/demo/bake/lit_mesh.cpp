@@ -9,9 +9,11 @@
 #include "runtime/demo/bake/lit_texture.h"
 #include "runtime/demo/bake/subdivided_mesh.h"
 #include "runtime/demo/image/exposure.h"
+#include "runtime/demo/image/pixel_hash.h"
 #include "runtime/demo/image/tone_curve.h"
 #include "runtime/rays/float3_glm.h"
-#include "runtime/rays/sample_sequence.h"
+#include "runtime/rays/sampling.h"
+#include "runtime/rays/triangle.h"
 
 namespace rebounce {
 namespace {
@@ -39,7 +41,9 @@ class Surroundings {
     for (std::size_t v = 1; v < begin_.size(); ++v) begin_[v] += begin_[v - 1];
     std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
     for (std::uint32_t t = 0; t < mesh.triangle.size(); ++t) {
-      const double area = area_of(mesh.triangle[t], position);
+      const auto [a, b, c] = mesh.triangle[t];
+      const double area =
+          area_of({to_dvec3(position[a]), to_dvec3(position[b]), to_dvec3(position[c])});
       for (std::uint32_t k = 0; k < 3; ++k) {
         const std::uint32_t v = mesh.triangle[t][k], at = next[v]++;
         corner_[at] = {t, k, area + (at > begin_[v] ? corner_[at - 1].area_end : 0)};
@@ -52,12 +56,6 @@ class Surroundings {
   }
 
  private:
-  static double area_of(const Uint3& t, std::span<const Float3> position) {
-    const glm::dvec3 a = to_dvec3(position[t[0]]);
-    return 0.5 *
-           glm::length(glm::cross(to_dvec3(position[t[1]]) - a, to_dvec3(position[t[2]]) - a));
-  }
-
   std::vector<std::uint32_t> begin_;
   std::vector<Corner> corner_;
 };
@@ -107,8 +105,8 @@ class VertexLighter {
     const auto chosen = std::min(std::ranges::lower_bound(corners, choice * corners.back().area_end,
                                                           {}, &Surroundings::Corner::area_end),
                                  corners.end() - 1);
-    const glm::vec3 inside =
-        near_corner(chosen->index, r2_point(k, glm::vec2(hash_to_unit(v, 0), hash_to_unit(v, 1))));
+    const glm::vec3 inside = near_corner(
+        chosen->index, glm::vec2(r2_point(k, {hash_to_unit(v, 0), hash_to_unit(v, 1)})));
     const std::array<glm::vec3, 3>& corner = mesh_.corner[chosen->triangle];
     CameraSample sample{.pixel = v, .index = k};
     sample.point = lighter_.surface().point_on(

@@ -4,8 +4,9 @@
 #include <cmath>
 #include <vector>
 
+#include "runtime/demo/image/pixel_hash.h"
 #include "runtime/rays/float3_glm.h"
-#include "runtime/rays/sample_sequence.h"
+#include "runtime/rays/sampling.h"
 
 namespace rebounce {
 namespace {
@@ -79,8 +80,7 @@ ScreenImage light_texture(const TransferData& data, const SurfaceLighter& lighte
       pieces.push_back({lighter.surface().point_on(t, frame.moved(map.weight[k], {0, 0})),
                         frame.width(), added.empty() ? Float3{} : added[k]});
       for (std::uint32_t s = 0; s < count; ++s) {
-        const glm::vec2 offset =
-            r2_point(s, glm::vec2(hash_to_unit(piece, 0), hash_to_unit(piece, 1))) - 0.5F;
+        const glm::vec2 offset(r2_point(s, {hash_to_unit(piece, 0), hash_to_unit(piece, 1)}) - 0.5);
         CameraSample sample{.pixel = piece, .index = s};
         sample.point = lighter.surface().point_on(t, frame.moved(map.weight[k], offset));
         samples.push_back(sample);

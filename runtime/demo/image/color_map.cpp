@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "runtime/demo/image/pixel_hash.h"
 #include "runtime/demo/image/srgb.h"
-#include "runtime/rays/sample_sequence.h"
 
 namespace rebounce {
 

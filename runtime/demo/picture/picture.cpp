@@ -9,6 +9,7 @@
 #include "rebounce/error.h"
 #include "runtime/demo/image/color_map.h"
 #include "runtime/demo/image/exposure.h"
+#include "runtime/demo/image/pixel_hash.h"
 #include "runtime/demo/image/srgb.h"
 #include "runtime/demo/image/tone_curve.h"
 #include "runtime/demo/shading/direct_light.h"
@@ -16,7 +17,6 @@
 #include "runtime/demo/shading/emitters.h"
 #include "runtime/lights/sky_light.h"
 #include "runtime/rays/float3_glm.h"
-#include "runtime/rays/sample_sequence.h"
 
 namespace rebounce {
 namespace {

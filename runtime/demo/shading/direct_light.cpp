@@ -4,11 +4,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "runtime/demo/image/pixel_hash.h"
 #include "runtime/lights/lamp_kind.h"
 #include "runtime/lights/light_sampling.h"
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/polygon_form_factor.h"
-#include "runtime/rays/sample_sequence.h"
+#include "runtime/rays/sampling.h"
 
 namespace rebounce {
 namespace {
@@ -70,8 +71,8 @@ constexpr std::uint32_t kPlacesPerSample = 4;
 
 // Sample point k of a camera sample; together the samples of a pixel cover the lamp evenly.
 glm::vec2 place_on_lamp(const CameraSample& sample, std::uint32_t k) {
-  const glm::vec2 shift(hash_to_unit(sample.pixel, 5), hash_to_unit(sample.pixel, 6));
-  return r2_point(kPlacesPerSample * sample.index + k, shift);
+  return glm::vec2(r2_point(kPlacesPerSample * sample.index + k,
+                            {hash_to_unit(sample.pixel, 5), hash_to_unit(sample.pixel, 6)}));
 }
 
 // What arrives at the sample from place k, or from a lamp without places.
@@ -157,10 +158,10 @@ void add_emitter_light(std::span<CameraSample> samples, const Emitters& emitters
       const glm::vec3 arriving = from_piece(sample.point, *piece);
       if (arriving == glm::vec3(0)) continue;
       // The irradiance is exact; visibility is tested at one point of the piece.
-      const glm::vec2 shift(hash_to_unit(sample.pixel, 1), hash_to_unit(sample.pixel, 2));
+      const glm::vec2 place(
+          r2_point(index, {hash_to_unit(sample.pixel, 1), hash_to_unit(sample.pixel, 2)}));
       Ray ray;
-      if (!ray_to_piece(sample.point, *piece, point_on(*piece, r2_point(index, shift)), tracer,
-                        ray)) {
+      if (!ray_to_piece(sample.point, *piece, point_on(*piece, place), tracer, ray)) {
         continue;
       }
       shadow_rays.add(sample, ray, arriving * (weight * static_cast<float>(samples_per_pixel)));

@@ -153,6 +153,8 @@ TEST_F(ViewFactorsCommand, RefusesInOneLine) {
   expect_refused({"view-factors", path("no.stl"), "-o", path("f.npz")}, "cannot read");
   expect_refused({"view-factors", write("bad.obj", "v 0 0\n"), "-o", path("f.npz")},
                  "bad.obj, line 1: a number is missing");
+  expect_refused({"view-factors", squares, "-o", path("f.csv")}, "no format has names that end in");
+  EXPECT_FALSE(std::filesystem::exists(path("f.csv")));
   expect_failure({"view-factors", squares, "-o", path("case"), "--case", "1"},
                  "must be three digits", test::kUsage);
 }

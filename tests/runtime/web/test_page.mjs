@@ -55,13 +55,24 @@ async function openReady(viewport) {
 const sum = (page) => page.evaluate(
     () => window.rebounce.indirectIrradiance().reduce((total, value) => total + value, 0));
 
-/** Makes shadow maps small: without a graphics card they take most of the time of a frame. */
+/**
+ * Makes shadow maps small, those of lamps to come too: without a graphics card they take most of the
+ * time of a frame.
+ */
 const makeShadowsCoarse = (page) => page.evaluate(() => {
-  for (const { light } of window.rebounce.stage.lamps) {
-    light.shadow.mapSize.set(16, 16);
-    light.shadow.map?.dispose();
-    light.shadow.map = null;
-  }
+  const { stage } = window.rebounce;
+  const makeCoarse = ({ shadow }) => {
+    if (!shadow) return;
+    shadow.mapSize.set(16, 16);
+    shadow.map?.dispose();
+    shadow.map = null;
+  };
+  const addLamp = stage.addLamp.bind(stage);
+  stage.addLamp = (description) => {
+    addLamp(description);
+    makeCoarse(stage.lamps.at(-1).light);
+  };
+  for (const { light } of stage.lamps) makeCoarse(light);
 });
 
 /** Waits until the page has drawn what was last asked of it. */
@@ -120,6 +131,7 @@ test('the first button alone takes hold of a lamp', async () => {
 
 test('its controls do what they say', async () => {
   const { page, faults } = await openReady();
+  await makeShadowsCoarse(page);
   const changes = async (act) => {
     const light = await sum(page);
     await act();
@@ -251,6 +263,7 @@ test('a surface is drawn with its textures, by the formulas of the light that it
 
 test('Gauss-Seidel beside falls behind a switched lamp, and catches up', async () => {
   const { page, faults } = await openReady();
+  await makeShadowsCoarse(page);
   await page.click('#compare [data-kind=gauss-seidel]');
   await page.waitForSelector('#halves .half');
   const errors = () => page.evaluate(() => {
@@ -313,6 +326,7 @@ test("three.js's grid of probes beside is baked anew when a lamp is switched, an
 
 test('it works by keyboard', async () => {
   const { page, faults } = await openReady();
+  await makeShadowsCoarse(page);
   const state = () => page.evaluate(() => {
     const { lamps, ball, chosen, camera, comparison } = window.rebounce.stage;
     return {
