@@ -113,15 +113,15 @@ void LinkRefinement::revise(const std::vector<bool>& doubtful, const Progress& p
 
 double LinkRefinement::forecast(double epsilon, std::size_t sample, const Progress& progress) {
   const double kept_epsilon = std::exchange(epsilon_, epsilon);
-  const Forecast forecast = this->forecast({{0, 0, View::kUnknown}}, sample, progress);
+  const double links = forecast({{0, 0, View::kUnknown}}, sample, progress).links;
   epsilon_ = kept_epsilon;
-  return forecast.links;
+  return links;
 }
 
 LinkRefinement::Forecast LinkRefinement::forecast(std::vector<Candidate> generation,
                                                   std::size_t sample, const Progress& progress) {
   const std::uint64_t pairs = candidate_count_, rays = ray_count_;
-  Forecast forecast;
+  Forecast found;
   double weight = 1;
   std::vector<Outcome> outcomes;
   while (!generation.empty()) {
@@ -135,15 +135,15 @@ LinkRefinement::Forecast LinkRefinement::forecast(std::vector<Candidate> generat
     }
     outcomes.assign(generation.size(), {});
     const std::uint64_t before = work();
-    decide(generation, outcomes, progress);
-    forecast.work += weight * static_cast<double>(work() - before);
+    decide(generation, outcomes, progress, 0);
+    found.work += weight * static_cast<double>(work() - before);
     std::vector<Candidate> next;
     for (std::size_t k = 0; k < generation.size(); ++k) {
       const Outcome& outcome = outcomes[k];
       if (outcome.kind == Outcome::Kind::kLink) {
         const Link& link = outcome.link;
         const bool leaves = tree_[link.a].is_leaf() && tree_[link.b].is_leaf();
-        if (leaves || link.exchange_area > 0) forecast.links += weight;
+        if (leaves || link.exchange_area > 0) found.links += weight;
       } else if (outcome.kind != Outcome::Kind::kNothing) {
         append_children(generation[k], outcome, next);
       }
@@ -152,7 +152,7 @@ LinkRefinement::Forecast LinkRefinement::forecast(std::vector<Candidate> generat
   }
   candidate_count_ = pairs;
   ray_count_ = rays;
-  return forecast;
+  return found;
 }
 
 void LinkRefinement::add(std::span<const std::pair<std::uint32_t, std::uint32_t>> leaves) {
@@ -164,7 +164,6 @@ void LinkRefinement::add(std::span<const std::pair<std::uint32_t, std::uint32_t>
 }
 
 void LinkRefinement::refine(std::vector<Candidate> generation, const Progress& progress) {
-  done_ = 0;
   const std::size_t sample = std::max<std::size_t>(tree_.nodes().size() / kNodesPerSample, 1);
   const double expected = forecast(generation, sample, progress).work;
   const std::uint64_t before = work();
@@ -177,8 +176,7 @@ void LinkRefinement::refine(std::vector<Candidate> generation, const Progress& p
       const std::span some =
           std::span(generation).subspan(begin, std::min(kPairsAtOnce, generation.size() - begin));
       outcomes.assign(some.size(), {});
-      done_ = static_cast<double>(work() - before) / expected;
-      decide(some, outcomes, progress);
+      decide(some, outcomes, progress, static_cast<double>(work() - before) / expected);
       merge(some, outcomes, links, next);
     }
     generation = std::move(next);
@@ -198,8 +196,10 @@ void LinkRefinement::append(std::vector<std::vector<Link>> made) {
   }
 }
 
+/// Decides what becomes of the pairs, and tells `progress` what fraction of the work was done
+/// before.
 void LinkRefinement::decide(std::span<const Candidate> generation, std::vector<Outcome>& outcomes,
-                            const Progress& progress) {
+                            const Progress& progress, double done) {
   const Ranks ranks;
   std::atomic<bool> stop = false;
   std::uint64_t rays = 0;
@@ -211,7 +211,7 @@ void LinkRefinement::decide(std::span<const Candidate> generation, std::vector<O
       if (stop || !ranks.makes(k, kPairsInTurn)) continue;
       outcomes[k] = decide(generation[k], scratch);
       const bool tells = progress && omp_get_thread_num() == 0 && k % 64 == 0;
-      if (tells && !progress(std::clamp(done_, 0.0, 1.0))) stop = true;
+      if (tells && !progress(std::min(done, 1.0))) stop = true;
     }
     rays += scratch.ray_count;
   }

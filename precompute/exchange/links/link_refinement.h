@@ -110,7 +110,7 @@ class LinkRefinement {
   std::vector<std::uint8_t> nodes_with(const std::vector<bool>& patches) const;
   void append(std::vector<std::vector<Link>> made);
   void decide(std::span<const Candidate> generation, std::vector<Outcome>& outcomes,
-              const Progress& progress);
+              const Progress& progress, double done);
   Outcome decide(const Candidate& pair, Scratch& scratch) const;
   Outcome link_patches(const Candidate& pair) const;
   Outcome link_nodes(const Candidate& pair, Scratch& scratch) const;
@@ -138,7 +138,6 @@ class LinkRefinement {
   std::vector<Candidate> empty_;
   /// [nodes] nonzero if a node holds a doubtful patch; empty if none does.
   std::vector<std::uint8_t> doubtful_;
-  double done_ = 0;  ///< fraction of the work that is done
   std::uint64_t candidate_count_ = 0, ray_count_ = 0;
 };
 
