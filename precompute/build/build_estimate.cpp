@@ -218,7 +218,7 @@ void sample_pairs(const PatchModel& model, const RayTracer& tracer, const BuildS
   if (decided.operator_kind == OperatorKind::kNoOperator) return;
   estimate.inverse_seconds =
       forecast_dense_transfer(estimate.patch_count, distinct_channels(model.patches.reflectance),
-                              arithmetic_of(decided.operator_kind));
+                              measure_tile_speed(arithmetic_of(decided.operator_kind)));
 }
 
 CostEstimate estimate_after_links(const LinkedBuild& build, std::uint64_t limit_bytes) {

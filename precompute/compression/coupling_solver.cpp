@@ -42,6 +42,15 @@ std::vector<bool> wanted_columns(const FramedCells& framed) {
 
 }  // namespace
 
+std::uint64_t coupling_count(const SharedBases& bases, const FramedCells& cells) {
+  const std::vector<bool> wanted = wanted_columns(cells);
+  std::uint64_t count = 0;
+  for (std::size_t c = 0; c < wanted.size(); ++c) {
+    if (wanted[c]) count += bases.coupling_count(c);
+  }
+  return count;
+}
+
 CouplingSolver::CouplingSolver(const SolvedTransfer& solved, const SharedBases& bases,
                                const FramedCells& cells, std::size_t cells_together,
                                const BlockCheckpoint& checkpoint)
@@ -50,7 +59,8 @@ CouplingSolver::CouplingSolver(const SolvedTransfer& solved, const SharedBases& 
       is_wanted_(wanted_columns(cells)),
       together_(piece_count(Ranks().least(cells_together), kPackedCells) * kPackedCells),
       checkpoint_(checkpoint),
-      couplings_(bases.cell_count()) {
+      couplings_(bases.cell_count()),
+      packed_(bases.cell_count()) {
   const auto position = solved.form_factors().position();
   for (std::size_t cell = 0; cell < bases.cell_count(); ++cell) {
     std::vector<std::uint32_t>& own = position_.emplace_back();
@@ -58,13 +68,13 @@ CouplingSolver::CouplingSolver(const SolvedTransfer& solved, const SharedBases& 
     if (!is_missing(cell)) continue;
     std::optional<BlockPart> found = checkpoint.find(name_of(cell));
     if (found && found->values.size() == bases.coupling_count(cell)) {
-      couplings_[cell] = std::move(found->values);
+      packed_[cell] = pack_couplings(bases, cell, found->values);
     }
   }
 }
 
 bool CouplingSolver::is_missing(std::size_t cell) const {
-  return is_wanted_[cell] && couplings_[cell].size() < bases_.coupling_count(cell);
+  return is_wanted_[cell] && packed_[cell].empty() && bases_.coupling_count(cell) > 0;
 }
 
 bool CouplingSolver::is_missing(const Pack& pack) const {
@@ -130,7 +140,7 @@ double CouplingSolver::work() const {
   return work;
 }
 
-std::vector<std::vector<float>> CouplingSolver::run(const Progress& progress) {
+std::vector<PackedCouplings> CouplingSolver::run(const Progress& progress) {
   load_blas();
   const Ranks ranks;
   const double all = work();
@@ -143,8 +153,8 @@ std::vector<std::vector<float>> CouplingSolver::run(const Progress& progress) {
     solve_run(first, part_of(progress, done / all, (done + more) / all));
     done += more;
   }
-  ranks.share(std::span(couplings_), together_);
-  return std::move(couplings_);
+  ranks.share(std::span(packed_), together_);
+  return std::move(packed_);
 }
 
 void CouplingSolver::solve_run(std::size_t first, const Progress& progress) {
@@ -174,7 +184,9 @@ void CouplingSolver::solve_run(std::size_t first, const Progress& progress) {
   if (failure) std::rethrow_exception(failure);
   loop.finish();
   for (const std::size_t cell : missing) {
-    checkpoint_.keep(name_of(cell), {.blocks = {}, .values = couplings_[cell]});
+    BlockPart part{.blocks = {}, .values = std::move(couplings_[cell])};
+    checkpoint_.keep(name_of(cell), part);
+    packed_[cell] = pack_couplings(bases_, cell, part.values);
   }
 }
 
@@ -201,11 +213,11 @@ void CouplingSolver::solve(const Pack& pack, SolvedTransfer::Workspace& workspac
   }
 }
 
-/// Keeps the couplings of the vectors of a pack with those of cell `d`.
+/// Keeps the couplings of the vectors of a pack with those of cell `d`, where they are missing.
 void CouplingSolver::keep(const Pack& pack, std::size_t d, const MatrixXf& found) {
   Index column = 0;
   for (const auto& [cell, begin, count] : pack.parts) {
-    if (cell <= d) {
+    if (cell <= d && is_missing(cell)) {
       const Index rows = bases_.ranks_between(pack.matrix, cell, bases_.cell_count());
       float* const first = couplings_[cell].data() + bases_.coupling_begin(pack.matrix, cell);
       Eigen::Map<MatrixXf> couplings(first + begin * rows, rows, count);

@@ -8,6 +8,7 @@
 #include "precompute/base/progress.h"
 #include "precompute/compression/block_checkpoint.h"
 #include "precompute/compression/matrix_compression.h"
+#include "precompute/inverse/packed_couplings.h"
 #include "precompute/inverse/shared_bases.h"
 #include "precompute/inverse/solved_transfer.h"
 
@@ -19,13 +20,16 @@ struct FramedCells {
   std::span<const std::uint32_t> clusters;
 };
 
+/// The number of couplings that are wanted: those of cells in whose columns an entry on or below
+/// the diagonal is, by the roles of the frame.
+std::uint64_t coupling_count(const SharedBases& bases, const FramedCells& cells);
+
 /// Solves for the couplings of shared bases, some cells at a time.
 class CouplingSolver {
  public:
-  /// Finds the cells that `checkpoint` holds. Couplings are wanted of cells in whose columns an
-  /// entry on or below the diagonal is, by the roles of the frame. `solved`, `bases` and
-  /// `checkpoint` must outlive the object. `cells_together` > 0 cells or a few more are solved for
-  /// at the same time; the bits do not depend on it. Ranks take runs of so many cells in turns.
+  /// Finds the cells that `checkpoint` holds. `solved`, `bases` and `checkpoint` must outlive the
+  /// object. `cells_together` > 0 cells or a few more are solved for at the same time; the bits do
+  /// not depend on it. Ranks take runs of so many cells in turns.
   CouplingSolver(const SolvedTransfer& solved, const SharedBases& bases, const FramedCells& cells,
                  std::size_t cells_together, const BlockCheckpoint& checkpoint);
 
@@ -37,7 +41,7 @@ class CouplingSolver {
 
   /// Does the work and keeps the couplings of every cell in the checkpoint. Returns those of all
   /// cells, empty where they are not wanted. Call it once. Throws Cancelled if asked to stop.
-  std::vector<std::vector<float>> run(const Progress& progress);
+  std::vector<PackedCouplings> run(const Progress& progress);
 
  private:
   /// Neighbouring vectors of the basis of a cell.
@@ -69,7 +73,8 @@ class CouplingSolver {
   std::size_t together_;
   const BlockCheckpoint& checkpoint_;
   std::vector<std::vector<std::uint32_t>> position_;  ///< of the patches of each cell
-  std::vector<std::vector<float>> couplings_;         ///< by cell; empty until they are known
+  std::vector<std::vector<float>> couplings_;         ///< by cell, of the run that is solved for
+  std::vector<PackedCouplings> packed_;               ///< by cell; empty until they are known
 };
 
 }  // namespace rebounce

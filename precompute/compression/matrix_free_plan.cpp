@@ -16,9 +16,13 @@
 namespace rebounce {
 namespace {
 
-// Bytes per patch, for each matrix, of bases, couplings and the rounds of the search, as measured
-// (lab/114, lab/132). They hold at the default tolerance and grow with this power of 1 / tolerance.
-constexpr double kOperatorBytes = 8.4e3, kOperatorGrowth = 0.4;
+// Bytes per patch, for each matrix, of bases and the rounds of the search, and couplings in rooms,
+// as measured (lab/114, lab/132, lab/156). They hold at the default tolerance and grow with this
+// power of 1 / tolerance.
+constexpr double kOperatorBytes = 6.7e3, kRoomCouplings = 450, kOperatorGrowth = 0.4;
+
+// Bytes of a coupling (pack_couplings; lab/156).
+constexpr double kCouplingBytes = 1;
 
 // Of a patch while a dense operator is compressed, beside the lights: candidates of the search and
 // the light that they are judged by; blocks that are at work, at most so much (lab/114).
@@ -27,7 +31,8 @@ constexpr std::size_t kSearchBytes = 7000, kWorkBytes = 16000, kMostWorkBytes = 
 }  // namespace
 
 MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::size_t matrix_count,
-                                                 const MatrixFreeTransferSettings& settings) {
+                                                 const MatrixFreeTransferSettings& settings,
+                                                 std::uint64_t coupling_count) {
   constexpr std::size_t kBlasBytes = 20'000'000;  // of OpenBLAS, for each thread but the first
   constexpr std::size_t kGroupsOfThread = 4;      // of a run, so that all threads end together
   constexpr std::size_t kVectors = 9;             // what is sent, those of the solver, coefficients
@@ -39,12 +44,13 @@ MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::s
   // (lab/114).
   const std::size_t piece = side * side * matrix_count * sizeof(float);
   const std::uint64_t limit = settings.memory_limit_bytes;
-  const double operators =
-      kOperatorBytes * static_cast<double>(matrix_count) *
-      wanted_part(settings.roles, patch_count) *
-      std::pow(kDefaultTolerance / settings.compression.tolerance, kOperatorGrowth);
-  const std::size_t kept = patch_count * kFittingLightBytes +
-                           static_cast<std::size_t>(static_cast<double>(patch_count) * operators);
+  const double rows = static_cast<double>(patch_count * matrix_count) *
+                      wanted_part(settings.roles, patch_count) *
+                      std::pow(kDefaultTolerance / settings.compression.tolerance, kOperatorGrowth);
+  const double couplings = std::max(kRoomCouplings * rows, static_cast<double>(coupling_count));
+  const std::size_t kept =
+      patch_count * kFittingLightBytes +
+      static_cast<std::size_t>(kOperatorBytes * rows + kCouplingBytes * couplings);
 
   MatrixFreeTransferPlan plan;
   for (plan.thread_count = omp_get_max_threads();; --plan.thread_count) {

@@ -32,9 +32,11 @@ struct MatrixFreeTransferPlan {
 };
 
 /// The plan with the most threads, at most those of OpenMP, that keeps to the limit of `settings`.
-/// Only a plan with one thread may be above the limit: no plan takes less.
+/// Only a plan with one thread may be above the limit: no plan takes less. `coupling_count`: the
+/// number of couplings, once bases are known; the plan is for as many as in rooms at the least.
 MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::size_t matrix_count,
-                                                 const MatrixFreeTransferSettings& settings = {});
+                                                 const MatrixFreeTransferSettings& settings = {},
+                                                 std::uint64_t coupling_count = 0);
 
 /// Peak memory of compressing a dense operator (f32) to a hierarchical one, with the dense one.
 std::uint64_t dense_compression_peak_bytes(std::size_t patch_count, std::size_t matrix_count);

@@ -51,9 +51,10 @@ HierarchicalStorage coarser(const HierarchicalOperator& form_factors, const Patc
 
 /// The plan for `patches`. Throws Error if it does not fit into the memory limit.
 MatrixFreeTransferPlan checked_plan(const PatchTable& patches,
-                                    const MatrixFreeTransferSettings& settings) {
-  const MatrixFreeTransferPlan plan =
-      plan_matrix_free_transfer(patches.size(), distinct_channels(patches.reflectance), settings);
+                                    const MatrixFreeTransferSettings& settings,
+                                    std::uint64_t couplings = 0) {
+  const MatrixFreeTransferPlan plan = plan_matrix_free_transfer(
+      patches.size(), distinct_channels(patches.reflectance), settings, couplings);
   check_memory(patches.size(), plan, settings);
   return plan;
 }
@@ -105,12 +106,14 @@ MatrixFreeTransfer::MatrixFreeTransfer(const HierarchicalOperator& form_factors,
   const std::vector<std::uint32_t> cells = clusters_up_to(frame.tree, kBasisCell);
   SharedBases bases = sample_bases(state.solved, frame, cells, kBasisPart * state.tolerance(),
                                    part_of(progress, kVectorsBefore / usual, kBefore / usual));
-  CouplingSolver solver(state.solved, bases, {frame, cells}, state.plan.cell_count, checkpoint);
+  const FramedCells framed{frame, cells};
+  state.plan = checked_plan(patches, settings, coupling_count(bases, framed));
+  const ThreadLimit limited_to_couplings(state.plan.thread_count);
+  CouplingSolver solver(state.solved, bases, framed, state.plan.cell_count, checkpoint);
   const double begin = kBefore / usual, all = kBefore + solver.work() + kVectorsOfRounds;
   state.solving_part = std::max(begin, (kBefore + solver.work()) / all);
   state.solve_count = bases.sample_count + solver.vector_count();
-  std::vector<std::vector<float>> couplings =
-      solver.run(part_of(progress, begin, state.solving_part));
+  std::vector<PackedCouplings> couplings = solver.run(part_of(progress, begin, state.solving_part));
   state.matrix.set_entries(std::move(bases), std::move(couplings));
 }
 

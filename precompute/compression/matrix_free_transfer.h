@@ -23,7 +23,8 @@ namespace rebounce {
 class MatrixFreeTransfer {
  public:
   /// Solves for the matrix in its bases. All arguments but the lights must outlive the object.
-  /// Throws Error if the least memory is above the limit, if F is not a passive exchange (I - R G R
+  /// Throws Error if the least memory is above the limit, which is known for certain once there are
+  /// bases, if F is not a passive exchange (I - R G R
   /// not positive definite), or if the checkpoint cannot be written; Cancelled if asked to stop.
   MatrixFreeTransfer(const HierarchicalOperator& form_factors, const PatchTable& patches,
                      const FittingLights& lights, const MatrixFreeTransferSettings& settings,

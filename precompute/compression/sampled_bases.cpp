@@ -32,6 +32,9 @@ constexpr double kSamplesOfRank = 3;
 // The fewest and the most samples for each matrix, with those that judge (lab/132).
 constexpr Index kLeastSamples = 512, kMostSamples = 1536;
 
+// The energy that rounding of couplings adds, as a part of what bases miss (lab/156).
+constexpr double kRoundedPart = 1.0 / 16;
+
 /// Light of all bounces but the first over each cell under its weight, [patches][samples].
 using Samples = std::vector<MatrixXf>;
 
@@ -276,6 +279,16 @@ std::vector<Index> find_ranks(const BasisSampler& sampler, std::span<const Direc
   return ranks;
 }
 
+/// The step of couplings that rounding adds a part of the missing energy with. Bases are
+/// orthonormal under their weights, so that the errors of the couplings have the energy of those of
+/// the light; an error of rounding has a twelfth of the square of the step.
+double step_of(std::span<const Directions> cells, std::span<const Index> ranks) {
+  double missing = 0;
+  for (std::size_t c = 0; c < cells.size(); ++c) missing += cells[c].missing[ranks[c]];
+  const auto vectors = static_cast<double>(std::max<Index>(1, sum_of(ranks)));
+  return std::sqrt(12 * kRoundedPart * missing) / vectors;
+}
+
 /// Appends the bases of one matrix.
 void sample_matrix(const BasisSampler& sampler, std::uint32_t matrix, double allowed,
                    SharedBases& result, const Progress& progress) {
@@ -285,17 +298,23 @@ void sample_matrix(const BasisSampler& sampler, std::uint32_t matrix, double all
     return sampler.draw(matrix, number++);
   };
   Samples light;
-  while (static_cast<Index>(number + 1) * kSamples < kLeastSamples) append(light, draw());
+  double enough = kLeastSamples - kSamples;
+  const auto are_enough = [&] {
+    const Index count = light.empty() ? 0 : light.front().cols();
+    return static_cast<double>(count) >= enough || count >= kMostSamples;
+  };
   for (;;) {
+    while (!are_enough()) append(light, draw());
     const Samples judges = draw();
     const std::vector<Directions> directions = sampler.find_directions(light, judges);
     const std::vector<Index> ranks = find_ranks(sampler, directions, judges, allowed);
-    const double usual = static_cast<double>(sum_of(ranks)) / static_cast<double>(ranks.size());
-    const Index samples = light.front().cols();
-    if (static_cast<double>(samples) < kSamplesOfRank * usual && samples < kMostSamples) {
+    enough =
+        kSamplesOfRank * static_cast<double>(sum_of(ranks)) / static_cast<double>(ranks.size());
+    if (!are_enough()) {
       append(light, judges);
       continue;
     }
+    result.step.push_back(step_of(directions, ranks));
     std::vector<SharedBases::Basis>& bases = result.bases.emplace_back();
     for (std::size_t c = 0; c < ranks.size(); ++c) {
       bases.push_back(sampler.basis(c, directions[c], ranks[c]));
@@ -312,7 +331,7 @@ SharedBases sample_bases(const SolvedTransfer& solved, const CompressionFrame& f
                          const Progress& progress) {
   load_blas();
   const BasisSampler sampler(solved, frame, cells);
-  SharedBases result{.patches = sampler.patches(), .bases = {}};
+  SharedBases result{.patches = sampler.patches(), .bases = {}, .step = {}};
   const double count = solved.matrix_count();
   // Errors count on both sides, and in every channel.
   const double allowed = tolerance * tolerance / 2 / kChannelCount;

@@ -104,9 +104,9 @@ void solve_channel(const ExchangeMatrix& exchange, const PatchTable& patches, in
   write_diagonal(exchange, patches.area, root, tiles);
 }
 
-/// Floating-point operations per second in products of tiles, all threads together.
+/// The speed of products of tiles in one arithmetic.
 template <typename Scalar>
-double measure_tile_speed() {
+double speed_of_products() {
   using Matrix = typename TiledMatrix<Scalar>::Matrix;
   constexpr Eigen::Index kSide = TiledMatrix<Scalar>::kTile;
   constexpr int kProducts = 16;  // of each thread: some milliseconds
@@ -157,12 +157,15 @@ std::size_t dense_transfer_peak_bytes(std::size_t patch_count, std::size_t matri
                                                     : TiledMatrix<float>::bytes(patch_count));
 }
 
+double measure_tile_speed(Arithmetic arithmetic) {
+  return arithmetic == Arithmetic::kDouble ? speed_of_products<double>()
+                                           : speed_of_products<float>();
+}
+
 double forecast_dense_transfer(std::size_t patch_count, std::size_t matrix_count,
-                               Arithmetic arithmetic) {
+                               double tile_speed) {
   const auto n = static_cast<double>(patch_count);
-  const double speed = arithmetic == Arithmetic::kDouble ? measure_tile_speed<double>()
-                                                         : measure_tile_speed<float>();
-  return 2 * n * n * n * static_cast<double>(matrix_count) / speed;
+  return 2 * n * n * n * static_cast<double>(matrix_count) / tile_speed;
 }
 
 std::shared_ptr<const DenseOperator> build_dense_transfer(const ExchangeMatrix& exchange,

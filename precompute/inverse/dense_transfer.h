@@ -36,10 +36,13 @@ std::shared_ptr<const DenseOperator> build_dense_transfer(
 std::size_t dense_transfer_peak_bytes(std::size_t patch_count, std::size_t matrix_count,
                                       Arithmetic arithmetic);
 
-/// Forecasts the seconds that build_dense_transfer takes with all OpenMP threads, from the time of
-/// a few products of tiles. The forecast leaves out all other work: it is rough and rather too low.
+/// Floating-point operations per second of a few products of tiles, with all OpenMP threads.
+double measure_tile_speed(Arithmetic arithmetic);
+
+/// Forecasts the seconds that build_dense_transfer takes on a machine of that `tile_speed`. The
+/// forecast leaves out all work but the products of tiles: it is rough and rather too low.
 double forecast_dense_transfer(std::size_t patch_count, std::size_t matrix_count,
-                               Arithmetic arithmetic);
+                               double tile_speed);
 
 /// Number of different reflectance channels, 1 to 3; writes which of them each channel uses.
 std::uint32_t distinct_channels(std::span<const Float3> reflectance,

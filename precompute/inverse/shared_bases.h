@@ -23,7 +23,9 @@ struct SharedBases {
 
   std::vector<std::vector<std::uint32_t>> patches;  ///< of each cell
   std::vector<std::vector<Basis>> bases;            ///< [matrices][cells]
-  std::size_t sample_count = 0;                     ///< vectors whose light they were found from
+  /// Couplings are rounded to multiples of it, [matrices]; 0: not at all.
+  std::vector<double> step;
+  std::size_t sample_count = 0;  ///< vectors whose light they were found from
 
   std::size_t cell_count() const { return patches.size(); }
   Eigen::Index rank(std::size_t matrix, std::size_t cell) const {

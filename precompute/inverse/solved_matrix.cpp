@@ -5,7 +5,7 @@ namespace rebounce {
 using Eigen::Index;
 using Eigen::MatrixXf;
 
-void SolvedMatrix::set_entries(SharedBases bases, std::vector<std::vector<float>> couplings) {
+void SolvedMatrix::set_entries(SharedBases bases, std::vector<PackedCouplings> couplings) {
   bases_ = std::move(bases);
   couplings_ = std::move(couplings);
   place_.resize(area().size());
@@ -43,8 +43,8 @@ void SolvedMatrix::add_later_bounces(std::uint32_t matrix, const Run& row, const
   const bool mirrored = row.cell < column.cell;
   const std::uint32_t low = mirrored ? row.cell : column.cell;
   if (couplings_[low].empty()) return;
-  const auto coupling =
-      bases_.coupling(matrix, mirrored ? column.cell : row.cell, low, couplings_[low]);
+  const MatrixXf coupling =
+      unpack_coupling(bases_, matrix, mirrored ? column.cell : row.cell, low, couplings_[low]);
   auto part = entries.block(row.begin, column.begin, row.vectors.rows(), column.vectors.rows());
   const MatrixXf right = mirrored ? MatrixXf(coupling.transpose() * column.vectors.transpose())
                                   : MatrixXf(coupling * column.vectors.transpose());

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "precompute/base/symmetric_matrix.h"
+#include "precompute/inverse/packed_couplings.h"
 #include "precompute/inverse/shared_bases.h"
 #include "precompute/inverse/solved_transfer.h"
 
@@ -32,9 +33,9 @@ class SolvedMatrix final : public SymmetricMatrix {
     return energies_;
   }
 
-  /// What `entries` needs: `bases`, and the couplings of each cell (SharedBases::coupling), empty
-  /// for a cell below which no entries are wanted.
-  void set_entries(SharedBases bases, std::vector<std::vector<float>> couplings);
+  /// What `entries` needs: `bases`, and the couplings of each cell, empty for a cell below which no
+  /// entries are wanted.
+  void set_entries(SharedBases bases, std::vector<PackedCouplings> couplings);
 
   /// Entries between cells without couplings are those of the form factors alone. Call set_entries
   /// before.
@@ -64,8 +65,8 @@ class SolvedMatrix final : public SymmetricMatrix {
   const SolvedTransfer& solved_;
   Eigen::VectorXd energies_;
   SharedBases bases_;
-  std::vector<std::vector<float>> couplings_;  ///< by cell
-  std::vector<Place> place_;                   ///< [n]
+  std::vector<PackedCouplings> couplings_;  ///< by cell
+  std::vector<Place> place_;                ///< [n]
 };
 
 }  // namespace rebounce

@@ -433,5 +433,18 @@ TEST(MatrixFreeTransfer, TakesMemoryInProportionToThePatches) {
   EXPECT_GT(plan_matrix_free_transfer(4000, 3, part).peak_bytes, usual / 4);
 }
 
+TEST(MatrixFreeTransfer, TakesMoreMemoryForMoreCouplingsThanInRooms) {
+  constexpr std::size_t kPatches = 65536;
+  constexpr std::uint64_t kFew = 1'000'000, kMany = 4'000'000'000;
+  const std::size_t usual = plan_matrix_free_transfer(kPatches, 3, {}, kFew).peak_bytes;
+  EXPECT_EQ(plan_matrix_free_transfer(kPatches, 3).peak_bytes, usual);
+  const MatrixFreeTransferPlan many = plan_matrix_free_transfer(kPatches, 3, {}, kMany);
+  EXPECT_GT(many.peak_bytes, usual + kMany / 2);
+  EXPECT_LT(many.peak_bytes, usual + kMany);
+  const MatrixFreeTransferSettings limited{.memory_limit_bytes = usual};
+  test::expect_error([&] { check_memory(kPatches, many, limited); }, "raise the memory limit");
+  EXPECT_EQ(plan_matrix_free_transfer(kPatches, 3, limited, kMany).thread_count, 1);
+}
+
 }  // namespace
 }  // namespace rebounce::test_matrix_free_transfer

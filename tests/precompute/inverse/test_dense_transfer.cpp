@@ -183,16 +183,15 @@ TEST(DenseTransfer, GreyScenesStoreOneMatrix) {
   EXPECT_EQ(Solved(colourful_room(), 100).dense->storage().matrix_count, 3U);
 }
 
-TEST(DenseTransfer, IsForecastForItsArithmeticAndChannels) {
-  const auto seconds = [](std::size_t patches, std::size_t channels, Arithmetic arithmetic) {
-    return forecast_dense_transfer(patches, channels, arithmetic);
-  };
+TEST(DenseTransfer, IsForecastFromTheSpeedOfItsProducts) {
   for (const Arithmetic arithmetic : {Arithmetic::kDouble, Arithmetic::kSingle}) {
-    EXPECT_EQ(seconds(0, 3, arithmetic), 0);
-    EXPECT_GT(seconds(1000, 1, arithmetic), 0);
-    EXPECT_GT(seconds(4000, 1, arithmetic), 4 * seconds(1000, 1, arithmetic));
-    EXPECT_GT(seconds(4000, 3, arithmetic), 1.5 * seconds(4000, 1, arithmetic));
+    EXPECT_GT(measure_tile_speed(arithmetic), 1e6);
   }
+  constexpr double kSpeed = 1e9;
+  EXPECT_EQ(forecast_dense_transfer(0, 3, kSpeed), 0);
+  EXPECT_DOUBLE_EQ(forecast_dense_transfer(1000, 1, kSpeed), 2);
+  EXPECT_DOUBLE_EQ(forecast_dense_transfer(4000, 3, kSpeed), 3 * 64 * 2);
+  EXPECT_DOUBLE_EQ(forecast_dense_transfer(4000, 3, 2 * kSpeed), 3 * 64);
 }
 
 TEST(DenseTransfer, RefusesReflectancesThatMakeLightGrow) {
