@@ -21,8 +21,8 @@ namespace {
 // power of 1 / tolerance.
 constexpr double kOperatorBytes = 6.7e3, kRoomCouplings = 450, kOperatorGrowth = 0.4;
 
-// Bytes of a coupling (pack_couplings; lab/156).
-constexpr double kCouplingBytes = 1;
+// Bytes of a coupling (pack_couplings), with what more vectors than in rooms take (lab/156).
+constexpr double kCouplingBytes = 1.3;
 
 // Of a patch while a dense operator is compressed, beside the lights: candidates of the search and
 // the light that they are judged by; blocks that are at work, at most so much (lab/114).
