@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <type_traits>
 
 namespace rebounce {
 namespace {
@@ -16,61 +17,46 @@ using Eigen::MatrixXf;
 constexpr Index kGroup = 16;
 
 template <typename T>
-void append(PackedCouplings& bytes, T value) {
-  const std::size_t begin = bytes.size();
-  bytes.resize(begin + sizeof value);
-  std::memcpy(bytes.data() + begin, &value, sizeof value);
-}
-
-template <typename T>
 T read(const std::uint8_t* bytes) {
   T value;
   std::memcpy(&value, bytes, sizeof value);
   return value;
 }
 
-/// Appends a group: the bytes of a value, then the values.
-class GroupPacker {
- public:
-  GroupPacker(double step, PackedCouplings& bytes)
-      : steps_of_one_(step > 0 ? 1 / step : 0), bytes_(bytes) {}
-
-  void append_group(std::span<const float> values) {
-    double largest = 0;
-    for (const float v : values) largest = std::max(largest, std::abs(v * steps_of_one_));
-    if (steps_of_one_ == 0 || largest > std::numeric_limits<std::int16_t>::max()) {
-      bytes_.push_back(sizeof(float));
-      for (const float v : values) append(bytes_, v);
-    } else if (largest > std::numeric_limits<std::int8_t>::max()) {
-      append_integers<std::int16_t>(values);
-    } else if (std::lround(largest) > 0) {
-      append_integers<std::int8_t>(values);
-    } else {
-      bytes_.push_back(0);
-    }
+/// Appends a group: the bytes of a value, then the values as multiples of `step`.
+template <typename T>
+void append_values(std::span<const float> values, double step, PackedCouplings& bytes) {
+  const std::size_t begin = bytes.size() + 1;
+  bytes.push_back(sizeof(T));
+  bytes.resize(begin + values.size() * sizeof(T));
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    const T value = std::is_integral_v<T> ? static_cast<T>(std::lround(values[k] / step))
+                                          : static_cast<T>(values[k]);
+    std::memcpy(bytes.data() + begin + k * sizeof(T), &value, sizeof(T));
   }
+}
 
- private:
-  template <typename Integer>
-  void append_integers(std::span<const float> values) {
-    bytes_.push_back(sizeof(Integer));
-    for (const float v : values) {
-      append(bytes_, static_cast<Integer>(std::lround(v * steps_of_one_)));
-    }
+void append_group(std::span<const float> values, double step, PackedCouplings& bytes) {
+  float largest = 0;
+  for (const float v : values) largest = std::max(largest, std::abs(v));
+  if (largest > std::numeric_limits<std::int16_t>::max() * step) {
+    append_values<float>(values, 1, bytes);
+  } else if (largest > std::numeric_limits<std::int8_t>::max() * step) {
+    append_values<std::int16_t>(values, step, bytes);
+  } else if (largest >= 0.5 * step && step > 0) {
+    append_values<std::int8_t>(values, step, bytes);
+  } else {
+    bytes.push_back(0);
   }
-
-  double steps_of_one_;
-  PackedCouplings& bytes_;
-};
+}
 
 void pack(const Eigen::Ref<const MatrixXf, 0, Eigen::OuterStride<>>& coupling, double step,
           PackedCouplings& bytes) {
-  GroupPacker packer(step, bytes);
   for (Index column = 0; column < coupling.cols(); ++column) {
     const float* const values = coupling.data() + column * coupling.outerStride();
     for (Index row = 0; row < coupling.rows(); row += kGroup) {
       const Index count = std::min(kGroup, coupling.rows() - row);
-      packer.append_group({values + row, static_cast<std::size_t>(count)});
+      append_group({values + row, static_cast<std::size_t>(count)}, step, bytes);
     }
   }
 }
