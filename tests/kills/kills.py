@@ -8,7 +8,7 @@ be written the program says so in one line and exits with 1.
 A moment is processor time that the run has used, so that it means the same on a machine that does
 other things too. Moments are drawn evenly over each stage of a command.
 
-Usage: kills.py PROGRAM WORK [--moments N] [--seed S] [--only COMMAND]
+Usage: kills.py PROGRAM WORK [--moments N] [--stages N] [--seed S] [--only COMMAND]
 """
 
 import argparse
@@ -242,17 +242,30 @@ def kill_in_stage(command, program, folder, known, stage, moments, draw):
     return counts
 
 
-def kill_often(command, program, work, moments, draw):
-    """Kills in each stage, and again if all runs have ended before. Returns the number of faults."""
+def drawn(stages, count, draw):
+    """So many of the stages in their order, the last one among them; all if `count` is None."""
+    if count is None or count >= len(stages):
+        return stages
+    places = sorted(draw.sample(range(len(stages) - 1), count - 1))
+    return [stages[place] for place in places] + stages[-1:]
+
+
+def kill_often(command, program, work, options, draw):
+    """Kills in stages, and again if all runs have ended before.
+
+    Returns the number of faults, and the processor time of a run that was not disturbed.
+    """
     known = reference(command, program, work / "out")
+    seconds = known.stages[-1][2]
+    stages, moments = drawn(known.stages, options.stages, draw), options.moments
     counts = collections.Counter()
     for _ in range(MOST_TRIES):
-        for stage in known.stages:
+        for stage in stages:
             counts += kill_in_stage(command, program, work / "out", known, stage, moments, draw)
         if counts["killed"] > 0:
-            return counts["faults"]
+            return counts["faults"], seconds
     print(f"FAULT: {command.name}: no run was killed before its end")
-    return counts["faults"] + 1
+    return counts["faults"] + 1, seconds
 
 
 def check_refusal(command, result, folder, outputs_before):
@@ -344,9 +357,7 @@ def vanishing(command, program, work, draw, seconds):
     return "exit 1"
 
 
-def vanish_often(command, program, work, moments, draw):
-    known = reference(command, program, work / "out")
-    seconds = known.stages[-1][2]
+def vanish_often(command, program, work, moments, draw, seconds):
     counts, faults = collections.Counter(), 0
     for _ in range(moments):
         try:
@@ -364,6 +375,7 @@ def argument_parser(description, moments):
     parser.add_argument("program", type=pathlib.Path)
     parser.add_argument("work", type=pathlib.Path)
     parser.add_argument("--moments", type=int, default=moments, help="in each stage of each command")
+    parser.add_argument("--stages", type=int, help="so many, drawn at random; all if left out")
     parser.add_argument("--seed", type=int, default=None)
     return parser
 
@@ -392,10 +404,11 @@ def main():
     for command in commands(transfer):
         if arguments.only not in (None, command.name):
             continue
-        faults += kill_often(command, program, work, arguments.moments, draw)
+        found, seconds = kill_often(command, program, work, arguments, draw)
+        faults += found
         faults += on_a_full_disk(command, program, work)
         faults += in_a_read_only_folder(command, program, work)
-        faults += vanish_often(command, program, work, min(arguments.moments, 10), draw)
+        faults += vanish_often(command, program, work, min(arguments.moments, 10), draw, seconds)
     shutil.rmtree(work, ignore_errors=True)
     print(f"{faults} faults")
     return 1 if faults else 0

@@ -105,7 +105,6 @@ def kill_and_go_on(program, folder, known, draw, most, moment):
 def main():
     parser = kills.argument_parser(__doc__.splitlines()[0], moments=1)
     parser.add_argument("--most", type=int, default=3, help="ranks at most, 2 or more")
-    parser.add_argument("--stages", type=int, help="so many, drawn at random; all if left out")
     options = parser.parse_args()
     program, work, draw = kills.prepared(options)
     folder = work / "out"

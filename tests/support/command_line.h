@@ -3,10 +3,14 @@
 // The program `rebounce` as scripts see it: exit status, what it prints where, what it writes.
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/support/subprocess.h"
@@ -24,14 +28,19 @@ inline const std::string kScenes = REBOUNCE_SOURCE_DIR "/tests/scenes/";
 inline const std::string kScene = kScenes + "cornell_box.gltf";
 inline const std::string kLights = kScenes + "ceiling_point.lights.json";
 
+/// The words, and an option with its value unless they say otherwise.
+inline Words with_option(Words words, const std::string& option, const std::string& value) {
+  if (std::ranges::find(words, option) == words.end()) {
+    words.insert(words.end(), {option, value});
+  }
+  return words;
+}
+
 /// Words of a build with few rays, which does not look whether vertices need rows of their own,
 /// unless the words say otherwise.
 inline Words quick(Words words) {
-  for (const Words& option : {Words{"--quality", "low"}, Words{"--receivers-at", "patches"}}) {
-    if (std::ranges::find(words, option[0]) != words.end()) continue;
-    words.insert(words.end(), option.begin(), option.end());
-  }
-  return words;
+  return with_option(with_option(std::move(words), "--quality", "low"), "--receivers-at",
+                     "patches");
 }
 
 inline bool is_one_line(const std::string& text) {
@@ -73,14 +82,40 @@ class CommandLine : public testing::Test {
     EXPECT_EQ(folder_.names(), before) << part;
   }
 
-  /// Precomputes the Cornell box, quickly; its transfer file.
-  std::string precompute(const std::string& name, const Words& options = {}) {
-    Words words = {"precompute", kScene,     "--patches", std::to_string(kPatchCount),
-                   "-o",         path(name), "--quiet"};
+  /// Precomputes a scene, quickly; its transfer file.
+  std::string precompute(const std::string& name, const Words& options = {},
+                         const std::string& scene = kScene) {
+    Words words = {"precompute", scene, "-o", path(name), "--quiet"};
     words.insert(words.end(), options.begin(), options.end());
-    const Outcome outcome = run(quick(words));
+    const Outcome outcome =
+        run(quick(with_option(words, "--patches", std::to_string(kPatchCount))));
     EXPECT_EQ(outcome.exit_code, kDone) << outcome.err;
     EXPECT_EQ(outcome.out + outcome.err, "");
+    return path(name);
+  }
+
+  /// The same file, for tests of what is done with it: one that an earlier test has left for
+  /// others, or it is left for them.
+  std::string built(const std::string& name, const Words& options = {},
+                    const std::string& scene = kScene) {
+    namespace fs = std::filesystem;
+    const fs::path folder = fs::path(REBOUNCE_BINARY_DIR) / "tests" / "built",
+                   shared = folder / (name_of_program() + name_of_build(options, scene));
+    if (fs::exists(shared)) {
+      fs::copy_file(shared, path(name));
+      return path(name);
+    }
+    precompute(name, options, scene);
+    fs::create_directories(folder);
+    // Those of older programs.
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+      if (!entry.path().filename().string().starts_with(name_of_program())) {
+        fs::remove(entry.path());
+      }
+    }
+    const fs::path unfinished = shared.string() + "." + std::to_string(::getpid());
+    fs::copy_file(path(name), unfinished);
+    fs::rename(unfinished, shared);
     return path(name);
   }
 
@@ -90,6 +125,18 @@ class CommandLine : public testing::Test {
   }
 
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
+
+  /// Differs from one build of the program to the next.
+  static std::string name_of_program() {
+    const auto time = std::filesystem::last_write_time(REBOUNCE_PROGRAM).time_since_epoch();
+    return std::to_string(time.count()) + "-";
+  }
+
+  static std::string name_of_build(const Words& options, const std::string& scene) {
+    std::string words = scene;
+    for (const std::string& option : options) words += ' ' + option;
+    return std::to_string(std::hash<std::string>()(words));
+  }
 
   const TemporaryFolder folder_;   // what the program is asked to write
   const TemporaryFolder printed_;  // what it prints

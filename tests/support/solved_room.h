@@ -34,7 +34,9 @@ struct SolvedRoom {
 
   SolvedRoom(const Scene& scene, std::size_t patch_count, Precision precision = Precision::kF32) {
     PatchModel model = make_patch_model(scene, {.patch_count = patch_count});
-    exchange = compute_form_factors(model, make_tracer(model)).exchange;
+    exchange =
+        compute_form_factors(model, make_tracer(model), with_quality(FormFactorQuality::kLow))
+            .exchange;
     patches = std::move(model.patches);
     dense = build_dense_transfer(exchange, patches, precision);
   }

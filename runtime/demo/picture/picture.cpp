@@ -22,7 +22,7 @@ namespace rebounce {
 namespace {
 
 constexpr int kTile = 16;  // pixels a side
-constexpr int kMaxSide = 32768;
+constexpr int kLargestSide = 32768;
 constexpr int kMaxSamplesPerAxis = 64;
 constexpr int kMaxEmitterSamples = 65536;
 constexpr int kMaxLayers = 16;    // layers that a camera ray sees through; the next one is opaque
@@ -35,8 +35,8 @@ void check_setting(int value, int most, const char* name) {
 }
 
 void check(const PictureSettings& settings) {
-  check_setting(settings.width, kMaxSide, "width");
-  check_setting(settings.height, kMaxSide, "height");
+  check_setting(settings.width, kLargestSide, "width");
+  check_setting(settings.height, kLargestSide, "height");
   check_setting(settings.samples_per_axis, kMaxSamplesPerAxis, "samples_per_axis");
   check_setting(settings.emitter_samples, kMaxEmitterSamples, "emitter_samples");
   const float fov = settings.camera.vertical_fov;

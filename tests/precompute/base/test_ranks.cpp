@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "precompute/build/transfer_build.h"
+#include "tests/support/built_scene.h"
 #include "tests/support/temporary_folder.h"
 #include "transfer/file/transfer_file_io.h"
 
@@ -116,8 +117,7 @@ TEST(Ranks, ALoneScopeSharesNothing) {
 
 TEST(Ranks, BuildsHaveTheBytesOfOne) {
   const test::TemporaryFolder folder;
-  BuildSettings settings;
-  settings.subdivision.patch_count = 60;
+  BuildSettings settings = test::quick_settings(40);
   settings.exchange_source = ExchangeSource::kLinks;
   settings.tolerance = 0.02;
   const auto build = [&](const std::string& name) {

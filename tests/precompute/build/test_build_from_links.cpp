@@ -54,6 +54,7 @@ BuildSettings settings_from_links() {
   settings.tolerance = kTolerance;
   settings.form_factor_tolerance = kTolerance / 5;
   settings.store_links = true;
+  settings.receiver_rows.at_vertices = false;
   return settings;
 }
 
@@ -86,6 +87,7 @@ Built exchange_of(const std::string& scene, ExchangeSource kind, std::size_t pat
   settings.exchange_source = kind;
   settings.store_form_factors = kind == ExchangeSource::kPairs;
   settings.operator_kind = OperatorKind::kNoOperator;
+  settings.receiver_rows.at_vertices = false;
   Built built;
   built.data = build_transfer_data(kScenes + scene, settings, built.report);
   return built;

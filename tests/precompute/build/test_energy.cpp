@@ -21,14 +21,6 @@ namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
 
-BuildSettings quick(std::size_t patch_count) {
-  BuildSettings settings;
-  settings.subdivision.patch_count = patch_count;
-  settings.form_factors = with_quality(FormFactorQuality::kLow);
-  settings.receiver_rows.at_vertices = false;
-  return settings;
-}
-
 TransferData build(Scene scene, const BuildSettings& settings) {
   BuildReport report;
   return build_transfer_data(std::move(scene), settings, report);
@@ -45,7 +37,8 @@ std::array<double, 3> flux(const PatchTable& patches, std::span<const Float3> va
 
 TEST(Energy, WhatLeavesArrivesOrGetsOut) {
   for (const char* name : {"furnished_room.gltf", "pavilion.gltf"}) {
-    const auto data = std::make_shared<const TransferData>(test::built_scene(name, quick(1000)));
+    const auto data =
+        std::make_shared<const TransferData>(test::built_scene(name, test::quick_settings(500)));
     Engine engine(data);
     Light lamp;
     lamp.position = {1.5F, 1.8F, 1.5F};
@@ -70,7 +63,7 @@ TEST(Energy, AnOpenBoxUnderASkyThatIsAsBrightIsAFurnace) {
   Scene scene = test::empty_scene({0.2F, 0.5F, 0.8F});
   test::add_box(scene, {-1, 0, -1}, {1, 1, 1}, true);
   test::remove_face(scene, test::Face::kHighY);
-  const TransferData data = build(std::move(scene), quick(600));
+  const TransferData data = build(std::move(scene), test::quick_settings(600));
   double seen = 0;
   std::vector<Float3> leaving(data.patches.size());
   for (std::size_t i = 0; i < leaving.size(); ++i) {
@@ -93,7 +86,7 @@ TEST(Energy, AnOpenBoxUnderASkyThatIsAsBrightIsAFurnace) {
 
 TEST(Energy, TheOperatorIsReciprocal) {
   // Area times what arrives at one patch from another is the same the other way round.
-  const TransferData data = test::built_scene("furnished_room.gltf", quick(1000));
+  const TransferData data = test::built_scene("furnished_room.gltf", test::quick_settings(500));
   constexpr unsigned kSeed = 7;
   std::mt19937 engine(kSeed);
   std::uniform_int_distribution<std::size_t> any(0, data.patches.size() - 1);
@@ -116,7 +109,7 @@ TEST(Energy, TheOperatorIsReciprocal) {
 }
 
 TEST(Energy, TheOperatorTellsWhatArrivesStraightFromEmitters) {
-  TransferData data = test::built_scene("cornell_box.gltf", quick(400));
+  TransferData data = test::built_scene("cornell_box.gltf", test::quick_settings(400));
   const std::vector<Float3> by_form_factors = data.emitted_irradiance;
   ASSERT_FALSE(by_form_factors.empty());
   ASSERT_TRUE(data.exchange.empty());
@@ -136,7 +129,7 @@ TEST(Energy, TheOperatorTellsWhatArrivesStraightFromEmitters) {
 
 TEST(Energy, OutputsInAFurnaceAreUniform) {
   Scene scene = test::furnished_room({0.5F, 0.5F, 0.5F});
-  BuildSettings settings = quick(600);
+  BuildSettings settings = test::quick_settings(600);
   settings.probes.grid = {3, 3, 3};
   settings.probes.ray_count = 512;
   const TransferData data = build(std::move(scene), settings);

@@ -19,8 +19,7 @@ struct Built {
   /// With a reflectance above 0, the form factors are those of a room that is white all over, and
   /// the operator stays that of the scene.
   explicit Built(float reflectance) {
-    BuildSettings settings;
-    settings.subdivision.patch_count = 400;
+    BuildSettings settings = test::quick_settings(400);
     settings.store_form_factors = true;
     TransferData made = test::built_scene("cornell_box.gltf", settings);
     if (reflectance > 0) {

@@ -14,11 +14,8 @@ namespace rebounce::test_flicker {
 namespace {
 
 const std::shared_ptr<const TransferData>& cornell_box() {
-  static const auto data = [] {
-    BuildSettings settings;
-    settings.subdivision.patch_count = 500;
-    return std::make_shared<const TransferData>(test::built_scene("cornell_box.gltf", settings));
-  }();
+  static const auto data = std::make_shared<const TransferData>(
+      test::built_scene("cornell_box.gltf", test::quick_settings(500)));
   return data;
 }
 

@@ -10,11 +10,9 @@ namespace {
 
 TEST(LongRun, FramesStayThoseOfAFreshEngine) {
   constexpr std::uint64_t kSeed = 1;
-  BuildSettings settings;
-  settings.subdivision.patch_count = 250;
-  test::LongRun run(
-      std::make_shared<const TransferData>(test::built_scene("furnished_room.gltf", settings)),
-      kSeed);
+  test::LongRun run(std::make_shared<const TransferData>(
+                        test::built_scene("furnished_room.gltf", test::quick_settings(250))),
+                    kSeed);
   while (run.frames() < 6000) run.frame();
   EXPECT_EQ(run.compared(), 6) << "seed " << kSeed;
   EXPECT_EQ(run.different(), 0) << "seed " << kSeed;

@@ -12,6 +12,7 @@
 #include "rebounce.h"
 #include "rebounce/engine.h"
 #include "runtime/solvers/solve_radiosity.h"
+#include "tests/support/built_scene.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 #include "transfer/base/area_norm.h"
@@ -27,8 +28,7 @@ const std::string kTwoRooms = REBOUNCE_SOURCE_DIR "/tests/scenes/two_rooms.gltf"
 
 /// What lamps in the first of two rooms do to the second.
 BuildSettings settings_of_rooms(ExchangeSource kind) {
-  BuildSettings settings;
-  settings.subdivision.patch_count = 500;
+  BuildSettings settings = test::quick_settings(400);
   settings.exchange_source = kind;
   settings.store_form_factors = kind == ExchangeSource::kPairs;
   settings.tolerance = 0.01;

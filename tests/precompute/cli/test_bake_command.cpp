@@ -18,7 +18,7 @@ using test::kUsage;
 using BakeCommand = CommandLine;
 
 TEST_F(BakeCommand, WritesASceneThatCanBeImported) {
-  const std::string file = precompute("box.safetensors");
+  const std::string file = built("box.safetensors");
   const json summary =
       summary_of({"bake", file, "--lights", kLights, "--triangles", "3000", "-o", path("lit.glb")});
   EXPECT_EQ(summary["bytes"], test::read_bytes(path("lit.glb")).size());
@@ -72,14 +72,14 @@ TEST_F(BakeCommand, WritesTheLightOfAnUnwrappedSceneIntoATexture) {
 }
 
 TEST_F(BakeCommand, TakesTheExposureThatIsAskedFor) {
-  const std::string file = precompute("box.safetensors");
+  const std::string file = built("box.safetensors");
   const json summary = summary_of({"bake", file, "--lights", kLights, "--triangles", "1",
                                    "--exposure", "1.5", "-o", path("lit.glb")});
   EXPECT_EQ(summary["exposure"], 1.5);
 }
 
 TEST_F(BakeCommand, RefusesWhatItCannotWriteOrRead) {
-  const std::string file = precompute("box.safetensors");
+  const std::string file = built("box.safetensors");
   expect_refused({"bake", file, "--lights", kLights, "-o", path("none/lit.glb")}, "none");
   expect_refused({"bake", path("no.safetensors"), "-o", path("lit.glb")}, "no.safetensors");
   EXPECT_EQ(run({"bake", file, "-o", path("lit.obj")}).exit_code, kUsage);

@@ -84,7 +84,7 @@ TEST_F(CameraOption, IsSaidSoThatItCanBeGivenAgain) {
 }
 
 TEST_F(CameraOption, TakesThoseOfTheSceneFirstByNameOrNumber) {
-  const std::string file = precompute("box.safetensors");
+  const std::string file = built("box.safetensors");
   const Words lights = {"--lights", kLights};
   const json camera = rendered(file, lights)["camera"];
   EXPECT_EQ(camera["source"], "scene");
@@ -97,7 +97,7 @@ TEST_F(CameraOption, TakesThoseOfTheSceneFirstByNameOrNumber) {
 }
 
 TEST_F(CameraOption, ExposesForWhatIsShown) {
-  const std::string file = precompute("box.safetensors");
+  const std::string file = built("box.safetensors");
   const auto exposure = [&](const char* show) {
     return rendered(file, {"--lights", kLights, "--show", show})["exposure"].get<double>();
   };

@@ -79,7 +79,7 @@ TEST_F(CommandLine, RefusesWrongUsageWithStatusTwo) {
 }
 
 TEST_F(CommandLine, RefusesBadInputInOneLine) {
-  const std::string file = precompute("box.safetensors");
+  const std::string file = built("box.safetensors");
   const std::string nowhere = path("missing/x");
   expect_refused({"precompute", path("no.glb"), "-o", path("x.safetensors")}, "no.glb");
   expect_refused({"precompute", write("no.gltf", "{"), "-o", path("x.safetensors")}, "no.gltf");
@@ -100,7 +100,7 @@ TEST_F(CommandLine, RefusesBadInputInOneLine) {
 }
 
 TEST_F(CommandLine, RefusesADamagedFile) {
-  std::string bytes = test::read_bytes(precompute("box.safetensors"));
+  std::string bytes = test::read_bytes(built("box.safetensors"));
   bytes[bytes.size() / 2] ^= 1;
   expect_refused({"info", write("box.safetensors", bytes)}, "checksum");
   bytes.resize(bytes.size() / 2);
@@ -139,7 +139,7 @@ TEST_F(CommandLine, SaysWhatScriptsRelyOn) {
 }
 
 TEST_F(CommandLine, DrawsWhateverIsAskedFor) {
-  const std::string file = precompute("box.safetensors", {"--store-form-factors"});
+  const std::string file = built("box.safetensors", {"--store-form-factors"});
   for (const char* show : {"direct", "indirect", "radiosity", "patches", "error"}) {
     const json drawn = summary_of({"render", file, "--lights", kLights, "--size", "64x48", "--show",
                                    show, "-o", path("x.png")});

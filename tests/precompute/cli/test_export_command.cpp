@@ -18,7 +18,7 @@ using test::kPatchCount;
 using ExportCommand = test::CommandLine;
 
 TEST_F(ExportCommand, ExportsReciprocalFormFactors) {
-  summary_of({"export", precompute("box.safetensors", {"--store-form-factors"}), "--what",
+  summary_of({"export", built("box.safetensors", {"--store-form-factors"}), "--what",
               "form-factors", "-o", path("f.npz")});
   const auto arrays = test::unzip(path("f.npz"));
   const auto form_factor = test::npz_values<double>(arrays, "form_factor", "<f8");
@@ -41,7 +41,7 @@ TEST_F(ExportCommand, ExportsReciprocalFormFactors) {
 
 TEST_F(ExportCommand, ExportsTheTransferOfTheFormFactors) {
   const std::string file =
-      precompute("box.safetensors", {"--operator", "dense", "--store-form-factors"});
+      built("box.safetensors", {"--operator", "dense", "--store-form-factors"});
   summary_of({"export", file, "--what", "form-factors", "-o", path("f.npz")});
   summary_of({"export", file, "--what", "transfer", "-o", path("y.npz")});
   const auto f = test::npz_values<double>(test::unzip(path("f.npz")), "form_factor", "<f8");
@@ -72,7 +72,7 @@ TEST_F(ExportCommand, ExportsTheTransferOfTheFormFactors) {
 }
 
 TEST_F(ExportCommand, ExportsPatchesAndMesh) {
-  const std::string file = precompute("box.safetensors");
+  const std::string file = built("box.safetensors");
   const json patches = summary_of({"export", file, "--what", "patches", "-o", path("p.npz")});
   for (const char* name : {"area", "centroid", "normal", "reflectance", "emitted_exitance"}) {
     EXPECT_TRUE(patches["arrays"].contains(name)) << name;

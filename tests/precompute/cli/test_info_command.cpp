@@ -27,7 +27,7 @@ class InfoCommand : public test::CommandLine {
 };
 
 TEST_F(InfoCommand, SaysInWordsWhatIsThereAndWhatIsNot) {
-  const std::string text = said(precompute("box.safetensors"));
+  const std::string text = said(built("box.safetensors"));
   for (const char* part : {"cornell_box.gltf, by rebounce ",
                            "bounds      0.556 x 0.549 x 0.559 m, from 0.000, 0.000",
                            "materials   ",
@@ -55,8 +55,8 @@ TEST_F(InfoCommand, SaysInWordsWhatIsThereAndWhatIsNot) {
 
 TEST_F(InfoCommand, NamesNoOptionForWhatIsThere) {
   const std::string text =
-      said(precompute("box.safetensors", {"--store-form-factors", "--store-links", "--probes",
-                                          "0.2", "--surface-harmonics", "16"}));
+      said(built("box.safetensors", {"--store-form-factors", "--store-links", "--probes", "0.2",
+                                     "--surface-harmonics", "16"}));
   for (const char* part :
        {"--compress-form-factors", "--store-", "--probes", "--surface-harmonics"}) {
     EXPECT_EQ(text.find(part), std::string::npos) << part << " in\n" << text;
@@ -68,7 +68,7 @@ TEST_F(InfoCommand, NamesNoOptionForWhatIsThere) {
 }
 
 TEST_F(InfoCommand, ADenseOperatorHasNoTolerance) {
-  const std::string file = precompute("box.safetensors", {"--operator", "dense"});
+  const std::string file = built("box.safetensors", {"--operator", "dense"});
   EXPECT_NE(said(file).find("exact to rounding"), std::string::npos);
   const json info = summary_of({"info", file});
   EXPECT_EQ(info["tolerance"], 0);
@@ -97,7 +97,7 @@ TEST_F(InfoCommand, HasNamesAndBoundsForScripts) {
 
 // Other programs may write what they like there.
 TEST_F(InfoCommand, TakesAnySettingsAndReport) {
-  TransferData data = load_transfer_file(precompute("box.safetensors"));
+  TransferData data = load_transfer_file(built("box.safetensors"));
   const std::string file = path("other.safetensors");
   for (const char* text :
        {"", "{}", R"({"errors": 1, "meshes": 2, "warnings": 3, "precision": 4})",

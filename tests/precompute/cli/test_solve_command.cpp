@@ -46,14 +46,14 @@ TEST_F(SolveCommand, IteratesOnCompressedFormFactors) {
 }
 
 TEST_F(SolveCommand, CompressedFormFactorsMustBeThere) {
-  expect_refused({"solve", precompute("box.safetensors"), "-o", path("x.csv"), "--method",
-                  "gathering", "--form-factors", "compressed"},
+  expect_refused({"solve", built("box.safetensors"), "-o", path("x.csv"), "--method", "gathering",
+                  "--form-factors", "compressed"},
                  "--compress-form-factors");
 }
 
 TEST_F(SolveCommand, SolvesTheSameByEitherMethod) {
   const std::string file =
-      precompute("box.safetensors", {"--operator", "dense", "--store-form-factors"});
+      built("box.safetensors", {"--operator", "dense", "--store-form-factors"});
   const std::string exact = path("transfer.csv"), iterated = path("gauss-seidel.csv");
   for (const std::string& setup : kSetups) {
     const std::string lights = kScenes + setup + ".lights.json";
@@ -74,7 +74,7 @@ TEST_F(SolveCommand, SolvesTheSameByEitherMethod) {
 }
 
 TEST_F(SolveCommand, SaysHowMuchLightThereIsAndWhatEachStageTakes) {
-  const std::string file = precompute("box.safetensors");
+  const std::string file = built("box.safetensors");
   const Words words = {"solve", file, "--lights", kLights, "-o", path("x.csv")};
   const json solved = summary_of(words);
   summary_of({"export", file, "--what", "patches", "-o", path("patches.npz")});
@@ -110,18 +110,18 @@ TEST_F(SolveCommand, SaysTheErrorOfItsFrameWhereThereAreFormFactors) {
   const auto solved = [&](const std::string& file) {
     return summary_of({"solve", file, "--lights", kLights, "-o", path("x.csv")});
   };
-  const json with = solved(precompute("with.safetensors", {"--store-form-factors"}));
+  const json with = solved(built("with.safetensors", {"--store-form-factors"}));
   EXPECT_GT(with["error_estimate"].get<double>(), 1e-5);
   EXPECT_LT(with["error_estimate"].get<double>(), 0.02);
   EXPECT_GE(with["error_bound"].get<double>(), with["error_estimate"].get<double>());
   EXPECT_LT(with["error_bound"].get<double>(), 0.1);
-  const json without = solved(precompute("without.safetensors"));
+  const json without = solved(built("without.safetensors"));
   EXPECT_TRUE(without["error_estimate"].is_null());
   EXPECT_TRUE(without["error_bound"].is_null());
 }
 
 TEST_F(SolveCommand, EveryMethodReachesTheResidualItWasAsked) {
-  const std::string file = precompute("box.safetensors", {"--store-form-factors"});
+  const std::string file = built("box.safetensors", {"--store-form-factors"});
   for (const NamedSolveMethod& method : kSolveMethods) {
     const std::string name(method.name);
     const json solved = summary_of({"solve", file, "--lights", kLights, "-o", path("x.csv"),
@@ -137,7 +137,7 @@ TEST_F(SolveCommand, EveryMethodReachesTheResidualItWasAsked) {
 }
 
 TEST_F(SolveCommand, SolvesHierarchicallyWhereThereAreLinks) {
-  const std::string file = precompute("box.safetensors", {"--store-links", "--store-form-factors"});
+  const std::string file = built("box.safetensors", {"--store-links", "--store-form-factors"});
   const std::string flat = path("flat.csv"), linked = path("linked.csv");
   summary_of({"solve", file, "--lights", kLights, "-o", flat, "--method", "gauss-seidel"});
   const json solved =
@@ -146,14 +146,14 @@ TEST_F(SolveCommand, SolvesHierarchicallyWhereThereAreLinks) {
   EXPECT_EQ(solved["form_factors"], "links");
   EXPECT_LT(difference(read_csv(flat), read_csv(linked), 6), 0.05);
 
-  const std::string without = precompute("pairs.safetensors");
+  const std::string without = built("pairs.safetensors");
   expect_refused(
       {"solve", without, "--lights", kLights, "-o", path("x.csv"), "--method", "hierarchical"},
       "--store-links");
 }
 
 TEST_F(SolveCommand, GathersAlongLinksWithAnyMethodThatGathers) {
-  const std::string file = precompute("box.safetensors", {"--store-links"});
+  const std::string file = built("box.safetensors", {"--store-links"});
   const auto solve = [&](const std::string& method, const std::string& name) {
     return std::vector<std::string>{"solve",    file,       "--lights", kLights,          "-o",
                                     path(name), "--method", method,     "--form-factors", "links"};
@@ -167,7 +167,7 @@ TEST_F(SolveCommand, GathersAlongLinksWithAnyMethodThatGathers) {
 }
 
 TEST_F(SolveCommand, WritesTheSameSolutionAsCsvAndNpz) {
-  const std::string file = precompute("box.safetensors");
+  const std::string file = built("box.safetensors");
   summary_of({"solve", file, "--lights", kLights, "-o", path("a.csv")});
   summary_of({"solve", file, "--lights", kLights, "-o", path("a.npz")});
   const Table table = read_csv(path("a.csv"));
@@ -184,7 +184,7 @@ TEST_F(SolveCommand, WritesTheSameSolutionAsCsvAndNpz) {
 }
 
 TEST_F(SolveCommand, RefusesAMalformedLightFileWithTheField) {
-  const std::string file = precompute("box.safetensors");
+  const std::string file = built("box.safetensors");
   const std::pair<std::string, std::string> cases[] = {
       {"", "is truncated: it ends at byte 0"},
       {R"({"lights": [{"intensity")", "is truncated: it ends at byte 24"},
@@ -248,7 +248,7 @@ TEST_F(SolveCommand, RefusesAMalformedLightFileWithTheField) {
 }
 
 TEST_F(SolveCommand, WarnsOfALampThatLightsNothing) {
-  const std::string file = precompute("box.safetensors");
+  const std::string file = built("box.safetensors");
   const std::string lights = write("far.lights.json", R"({"lights": [{"position": [0.3, 0.4, 0.3]},
       {"name": "cellar", "position": [0.3, -3, 0.3]}]})");
   const Words solve = {"solve", file, "--lights", lights, "-o", path("x.csv")};
@@ -271,7 +271,7 @@ TEST_F(SolveCommand, SaysWhatToDoWhereThereIsNoLight) {
 }
 
 TEST_F(SolveCommand, TakesEveryKindOfLight) {
-  const std::string file = precompute("box.safetensors");
+  const std::string file = built("box.safetensors");
   const std::string profile = "IESNA91\nTILT=NONE\n1 1 1 2 1 1 1 0 0 0\n1 1 1\n0 90\n0\n100 0\n";
   write("lamp.ies", profile);
   const auto irradiance = [&](const std::string& text) {
@@ -323,7 +323,7 @@ std::string glb(const json& document) {
 }
 
 TEST_F(SolveCommand, TakesLightsFromAGlb) {
-  const std::string file = precompute("box.safetensors");
+  const std::string file = built("box.safetensors");
   const std::string scene = write("lit.glb", glb(scene_with_light()));
   summary_of({"solve", file, "--lights", scene, "-o", path("glb.csv")});
   summary_of({"solve", file, "--lights", kLights, "-o", path("json.csv")});

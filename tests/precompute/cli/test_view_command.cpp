@@ -83,12 +83,8 @@ class ViewCommand : public CommandLine {
       GTEST_SKIP() << "this build has no viewer (REBOUNCE_BUILD_VIEWER)";
     }
     ASSERT_EQ(help.exit_code, kDone) << help.err;
-    file_ = path("box.safetensors");
     // As few patches as show colours bleed: it is the drawing that is looked at.
-    ASSERT_EQ(run(test::quick({"precompute", kScene, "--patches", "120", "--store-form-factors",
-                               "--quiet", "-o", file_}))
-                  .exit_code,
-              kDone);
+    file_ = built("box.safetensors", {"--patches", "120", "--store-form-factors"});
     const Outcome outcome =
         run({"view", file_, "--size", "16x16", "--screenshot", path("try.png")});
     // ./dev test installs a software renderer; other machines may have none.
@@ -108,12 +104,7 @@ class ViewCommand : public CommandLine {
 
   /// A furnished room of few patches.
   std::string furnished_room() {
-    std::string room = path("room.safetensors");
-    EXPECT_EQ(run(test::quick({"precompute", kScenes + "furnished_room.gltf", "--patches", "300",
-                               "--tolerance", "0.05", "--quiet", "-o", room}))
-                  .exit_code,
-              kDone);
-    return room;
+    return built("room.safetensors", {"--tolerance", "0.05"}, kScenes + "furnished_room.gltf");
   }
 
   std::string file_;

@@ -23,7 +23,7 @@ using Eigen::MatrixXf;
 
 const test::SolvedRoom& room() {
   static const test::SolvedRoom made(
-      test::furnished_room({0.7F, 0.5F, 0.2F}, {0.3F, 0.3F, 0.3F}, {0.1F, 0.3F, 0.9F}), 1200);
+      test::furnished_room({0.7F, 0.5F, 0.2F}, {0.3F, 0.3F, 0.3F}, {0.1F, 0.3F, 0.9F}), 800);
   return made;
 }
 

@@ -21,7 +21,7 @@ using Room = test::SolvedRoom;
 /// Coloured walls, a black block, another colour.
 const Room& furnished_room() {
   static const Room room(test::furnished_room({0.7F, 0.5F, 0.2F}, {0, 0, 0}, {0.1F, 0.3F, 0.9F}),
-                         1500);
+                         900);
   return room;
 }
 
@@ -138,7 +138,7 @@ TEST(HierarchicalTransfer, BlackLampsAreCarriedWhereTheyAreNamed) {
 
 TEST(HierarchicalTransfer, AGreyRoomStoresItsMatrixOnce) {
   constexpr Float3 kGrey = {0.6F, 0.6F, 0.6F};
-  const Room room(test::furnished_room(kGrey, {0, 0, 0}, kGrey), 800);
+  const Room room(test::furnished_room(kGrey, {0, 0, 0}, kGrey), 500);
   const HierarchicalOperator grey(
       compress_transfer(*room.dense, room.patches, lights_in(room.patches, 16, 1), 1e-7));
   EXPECT_EQ(grey.storage().matrix_count, 1U);

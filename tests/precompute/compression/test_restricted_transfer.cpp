@@ -39,7 +39,7 @@ Scene room_with_two_blocks() {
 }
 
 const Room& room() {
-  static const Room made(room_with_two_blocks(), 1200);
+  static const Room made(room_with_two_blocks(), 800);
   return made;
 }
 

@@ -20,8 +20,7 @@ namespace {
 
 const TransferData& cornell_box() {
   static const TransferData data = [] {
-    BuildSettings settings;
-    settings.subdivision.patch_count = 600;
+    BuildSettings settings = test::quick_settings(600);
     settings.probes.grid = {4, 3, 4};
     return test::built_scene("cornell_box.gltf", settings);
   }();

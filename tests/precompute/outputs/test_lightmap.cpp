@@ -16,6 +16,7 @@
 #include "runtime/rays/patch_points.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/brute_force.h"
+#include "tests/support/built_scene.h"
 #include "tests/support/expect_error.h"
 #include "tests/support/unwrapped_room.h"
 #include "tests/support/with_threads.h"
@@ -28,8 +29,7 @@ constexpr std::uint32_t kSize = 256;
 
 std::shared_ptr<const TransferData> build(const test::GltfBuilder& scene) {
   const test::TemporaryFolder folder;
-  BuildSettings settings;
-  settings.subdivision.patch_count = 900;
+  BuildSettings settings = test::quick_settings(900);
   settings.lightmap.size = kSize;
   BuildReport report;
   return std::make_shared<const TransferData>(
@@ -104,8 +104,7 @@ std::pair<double, int> error_of(const Engine& engine, std::span<const Float3> te
 /// Of few patches, whose texels have rows.
 TransferData build_rows() {
   const test::TemporaryFolder folder;
-  BuildSettings settings;
-  settings.subdivision.patch_count = 150;
+  BuildSettings settings = test::quick_settings(150);
   settings.lightmap.size = 64;
   settings.receiver_rows.at_texels = true;
   BuildReport report;
@@ -174,8 +173,7 @@ TEST(TexelRows, AreTheSameOnAnyNumberOfThreadsAndAllocateNothing) {
 TEST(TexelRows, NeedALightmap) {
   const test::TemporaryFolder folder;
   const auto path = test::unwrapped_scene(test::unwrapped_room()).write_glb(folder);
-  BuildSettings settings;
-  settings.subdivision.patch_count = 30;
+  BuildSettings settings = test::quick_settings(30);
   settings.receiver_rows.at_texels = true;
   BuildReport report;
   test::expect_error([&] { build_transfer_data(path, settings, report); }, "need a lightmap");

@@ -22,8 +22,7 @@ namespace {
 
 const std::shared_ptr<const TransferData>& cornell_box() {
   static const auto data = [] {
-    BuildSettings settings;
-    settings.subdivision.patch_count = 600;
+    BuildSettings settings = test::quick_settings(600);
     settings.surface_harmonics.ray_count = 512;
     return std::make_shared<const TransferData>(test::built_scene("cornell_box.gltf", settings));
   }();

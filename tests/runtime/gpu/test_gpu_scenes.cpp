@@ -83,8 +83,7 @@ std::vector<Float3> texture_from(const test::LightBuffer& light, const Lightmap&
 
 /// A scene of few patches with a lightmap and probes.
 std::shared_ptr<const TransferData> scene(const std::string& name, bool rows_at_vertices = false) {
-  BuildSettings settings;
-  settings.subdivision.patch_count = 600;
+  BuildSettings settings = test::quick_settings(600);
   settings.receiver_rows.at_vertices = rows_at_vertices;
   settings.receiver_rows.least_error = 0;
   settings.probes.grid = {3, 2, 3};

@@ -72,7 +72,7 @@ TEST(TransferFile, RefusesAnyFlippedBit) {
     stream.flush();
   };
   std::size_t accepted = 0;
-  for (std::size_t bit = 0; bit < 8 * file.size(); bit += bit < 8 * prefix ? 1 : 9) {
+  for (std::size_t bit = 0; bit < 8 * file.size(); bit += bit < 8 * prefix ? 1 : 41) {
     const std::size_t at = bit / 8;
     put(at, static_cast<char>(file[at] ^ (1 << bit % 8)));
     try {
