@@ -23,6 +23,7 @@ namespace rebounce::test_build_from_links {
 namespace {
 
 constexpr std::uint64_t kSeed = 20261120;
+constexpr std::size_t kRoomPatches = 300;
 constexpr double kTolerance = 0.01;
 
 // The same under the lamp for which links are worst.
@@ -49,7 +50,7 @@ struct Built {
 
 BuildSettings settings_from_links() {
   BuildSettings settings;
-  settings.subdivision.patch_count = 500;
+  settings.subdivision.patch_count = kRoomPatches;
   settings.exchange_source = ExchangeSource::kLinks;
   settings.tolerance = kTolerance;
   settings.form_factor_tolerance = kTolerance / 5;
@@ -150,10 +151,10 @@ TEST(BuildFromLinks, KeepsNoPairsAndIsTheirLightWithTheErrorOnRecord) {
   EXPECT_LT(std::ranges::max(of_links), data.record.error_bound);
 
   // Those that are stored are fewer than those that it was made from.
-  const Built found = exchange_of("furnished_room.gltf", ExchangeSource::kLinks, 500);
+  const Built found = exchange_of("furnished_room.gltf", ExchangeSource::kLinks, kRoomPatches);
   EXPECT_LT(data.links.pair.size(), found.data.links.pair.size() * 2 / 3);
 
-  const Built pairs = exchange_of("furnished_room.gltf", ExchangeSource::kPairs, 500);
+  const Built pairs = exchange_of("furnished_room.gltf", ExchangeSource::kPairs, kRoomPatches);
   ASSERT_EQ(pairs.data.patches.area, data.patches.area);
   const auto of_pairs =
       errors_against(lights, ReferenceSolver(pairs.data).indirect_irradiances(lights));

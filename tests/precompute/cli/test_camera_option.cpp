@@ -46,7 +46,7 @@ class CameraOption : public CommandLine {
 };
 
 TEST_F(CameraOption, DependsNeitherOnLightsNorOnPatchesNorOnTheCommand) {
-  const std::string file = furnished_room("300"), other = furnished_room("900");
+  const std::string file = furnished_room("300"), other = furnished_room("450");
   const json camera = rendered(file, {"--key-light"})["camera"];
   EXPECT_EQ(camera["source"], "geometry");
   EXPECT_FLOAT_EQ(camera["position"][1].get<float>(), 1.6F);

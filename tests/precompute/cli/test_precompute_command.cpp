@@ -134,6 +134,8 @@ TEST_F(PrecomputeCommand, LinksThatAreOffCountTowardTheTolerance) {
                        "links",
                        "--link-epsilon",
                        "0.05",
+                       "--receivers-at",
+                       "patches",
                        "--tolerance",
                        std::to_string(tolerance),
                        "-o",
@@ -201,8 +203,9 @@ TEST_F(PrecomputeCommand, AMissedToleranceFails) {
 TEST_F(PrecomputeCommand, FailsIfALampIsAboveThreeTimesTheTolerance) {
   // The largest of the check is 2.5 tolerances here, so that the file is taken. Should rounding of
   // another machine make it more than three, it must be refused.
-  const Outcome outcome = run({"precompute", kScene, "--patches", "300", "--form-factors", "links",
-                               "-o", path("box.safetensors"), "--quiet"});
+  const Outcome outcome =
+      run({"precompute", kScene, "--patches", "300", "--form-factors", "links", "--receivers-at",
+           "patches", "-o", path("box.safetensors"), "--quiet"});
   const double largest = summary_of({"info", path("box.safetensors")})["error_max"].get<double>();
   const bool kept = largest <= 3 * kDefaultTolerance;
   EXPECT_EQ(outcome.exit_code, kept ? 0 : 1);
@@ -253,9 +256,10 @@ TEST_F(PrecomputeCommand, MeetsThePatchSize) {
 
 TEST_F(PrecomputeCommand, WorksWithoutPairs) {
   const std::string file = path("box.safetensors");
-  const json built = summary_of({"precompute", kScene, "--patches", "400", "--form-factors",
-                                 "links", "--tolerance", "0.02", "--store-links",
-                                 "--compress-form-factors", "0.004", "-o", file});
+  const json built =
+      summary_of({"precompute", kScene, "--patches", "400", "--form-factors", "links",
+                  "--tolerance", "0.02", "--store-links", "--compress-form-factors", "0.004",
+                  "--receivers-at", "patches", "-o", file});
   EXPECT_EQ(built["form_factors"], "compressed");
   EXPECT_EQ(built["form_factor_count"], 0);
   EXPECT_GT(built["link_count"], 0);

@@ -22,7 +22,7 @@ using Lights = std::vector<std::vector<Float3>>;
 
 /// A room of 4 x 3 x 5 m with a block, of three channels.
 struct Room : test::SolvedRoom {
-  Room() : SolvedRoom(test::room_with_block({0.8F, 0.6F, 0.3F}), 900) {}
+  Room() : SolvedRoom(test::room_with_block({0.8F, 0.6F, 0.3F}), 1300) {}
 
   std::shared_ptr<const HierarchicalOperator> form_factors =
       test::dense_blocks(exchange, patches.area);

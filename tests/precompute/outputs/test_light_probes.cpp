@@ -47,7 +47,7 @@ ProbeErrors errors_of_probes(const Engine& engine) {
     if (probes.valid[p] == 0) continue;
     for (std::size_t k = 0; k < normals.size(); ++k) {
       const Float3 truth =
-          to_float3(test::irradiance_at(engine, probes.position[p], normals[k], 1 << 14));
+          to_float3(test::irradiance_at(engine, probes.position[p], normals[k], 1 << 13));
       const Float3 by_harmonics = probe_irradiance(light[p], normals[k]);
       const Float3& found = irradiance[p * normals.size() + k];
       for (int c = 0; c < kChannelCount; ++c) {

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "precompute/build/transfer_build.h"
 #include "precompute/import/import_gltf.h"
 #include "rebounce/outputs.h"
 #include "runtime/frame/engine_parts.h"
