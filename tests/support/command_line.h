@@ -126,14 +126,15 @@ class CommandLine : public testing::Test {
 
   std::string path(const std::string& name) const { return (folder_ / name).string(); }
 
-  /// Differs from one build of the program to the next.
-  static std::string name_of_program() {
-    const auto time = std::filesystem::last_write_time(REBOUNCE_PROGRAM).time_since_epoch();
-    return std::to_string(time.count()) + "-";
+  static std::string time_of(const std::string& file) {
+    return std::to_string(std::filesystem::last_write_time(file).time_since_epoch().count());
   }
 
+  /// Differs from one build of the program to the next.
+  static std::string name_of_program() { return time_of(REBOUNCE_PROGRAM) + "-"; }
+
   static std::string name_of_build(const Words& options, const std::string& scene) {
-    std::string words = scene;
+    std::string words = scene + time_of(scene);
     for (const std::string& option : options) words += ' ' + option;
     return std::to_string(std::hash<std::string>()(words));
   }
