@@ -33,6 +33,18 @@ const std::string& metadata(const SafetensorsFile& file, const char* name) {
   return found->second;
 }
 
+/// Whether the file has a part that may be left out. `name`: of its tensor that is empty if the
+/// part is, in which case a file has none of its tensors.
+bool has_part(const SafetensorsFile& file, const char* name) {
+  const auto found = file.tensors().find(name);
+  if (found == file.tensors().end()) return false;
+  const TensorShape& shape = found->second.shape;
+  if (!shape.empty() && shape[0] == 0) {
+    refuse(file, std::string("tensor ") + name + ": 0 rows, not at least 1");
+  }
+  return true;
+}
+
 template <typename Number>
 Number number(const SafetensorsFile& file, const char* name) {
   const std::string& text = metadata(file, name);
@@ -178,7 +190,7 @@ void read_scene(const SafetensorsFile& file, TransferData& data) {
 
 /// Empty if the file has no pairs.
 ExchangeMatrix read_exchange(const SafetensorsFile& file) {
-  if (!file.tensors().contains(tensor::kRowBegin)) return {};
+  if (!has_part(file, tensor::kRowBegin)) return {};
   return {file.tensor<std::uint64_t>(tensor::kRowBegin, {kAnySize}),
           file.tensor<std::uint32_t>(tensor::kColumn, {kAnySize}),
           file.tensor<float>(tensor::kExchangeArea, {kAnySize})};
@@ -187,7 +199,7 @@ ExchangeMatrix read_exchange(const SafetensorsFile& file) {
 /// Empty if the file has no links.
 FormFactorLinks read_links(const SafetensorsFile& file, const PatchTable& patches) {
   FormFactorLinks links;
-  if (!file.tensors().contains(tensor::kLinksPatch)) return links;
+  if (!has_part(file, tensor::kLinksPatch)) return links;
   visit_tensors_of_links(links, TensorReader(file));
   try {
     check_links(links, patches.size());
@@ -339,9 +351,9 @@ std::shared_ptr<const HierarchicalOperator> read_compressed_form_factors(
 
 /// A file without probes has none of their tensors.
 void read_probes(const SafetensorsFile& file, TransferData& data) {
-  if (!file.tensors().contains(tensor::kProbePosition)) return;
+  if (!has_part(file, tensor::kProbePosition)) return;
   visit_tensors_of_probes(data.probes, TensorReader(file));
-  if (file.tensors().contains(tensor::kProbeSkyBegin)) {
+  if (has_part(file, tensor::kProbeSkyBegin)) {
     visit_tensors_of_probe_sky(data.probes.sky_cells, TensorReader(file));
   }
   const auto grid = file.tensor<std::uint32_t>(tensor::kProbeGrid, {3});
@@ -352,9 +364,9 @@ void read_probes(const SafetensorsFile& file, TransferData& data) {
 /// A file without surface harmonics has none of their tensors.
 SurfaceHarmonics read_surface_harmonics(const SafetensorsFile& file) {
   SurfaceHarmonics harmonics;
-  if (!file.tensors().contains(tensor::kSurfaceSky)) return harmonics;
+  if (!has_part(file, tensor::kSurfaceSky)) return harmonics;
   visit_tensors_of_surface_harmonics(harmonics, TensorReader(file));
-  if (file.tensors().contains(tensor::kSurfaceSkyBegin)) {
+  if (has_part(file, tensor::kSurfaceSkyBegin)) {
     visit_tensors_of_surface_sky(harmonics.sky_cells, TensorReader(file));
   }
   return harmonics;
@@ -363,7 +375,7 @@ SurfaceHarmonics read_surface_harmonics(const SafetensorsFile& file) {
 /// A file without rows of receivers has none of their tensors.
 ReceiverRows read_receiver_rows(const SafetensorsFile& file, const tensor::RowNames& names) {
   ReceiverRows rows;
-  if (!file.tensors().contains(names.begin)) return rows;
+  if (!has_part(file, names.begin)) return rows;
   visit_tensors_of_receiver_rows(rows, names, TensorReader(file));
   const auto value = file.tensor<std::int8_t>(
       names.value, {ReceiverRows::kGroup * std::uint64_t{rows.entry_set.size()}}, TensorType::kI8);
@@ -374,11 +386,14 @@ ReceiverRows read_receiver_rows(const SafetensorsFile& file, const tensor::RowNa
 /// A file without a lightmap has none of its tensors.
 Lightmap read_lightmap(const SafetensorsFile& file) {
   Lightmap map;
-  if (!file.tensors().contains(tensor::kLightmapSize)) return map;
+  if (!has_part(file, tensor::kLightmapSize)) return map;
   visit_tensors_of_lightmap(map, TensorReader(file));
   const auto size = file.tensor<std::uint32_t>(tensor::kLightmapSize, {2});
   map.width = size[0];
   map.height = size[1];
+  if (map.width == 0 || map.height == 0) {
+    refuse(file, std::string("tensor ") + tensor::kLightmapSize + ": there are no texels");
+  }
   return map;
 }
 
@@ -395,11 +410,11 @@ TransferData read_transfer_file(const SafetensorsFile& file) {
   TransferData data;
   visit_tensors_of_patches(data.patches, TensorReader(file));
   visit_tensors_of_mesh(data.mesh, TensorReader(file));
-  if (file.tensors().contains(tensor::kOpacityMap)) {
+  if (has_part(file, tensor::kOpacityMap)) {
     visit_tensors_of_opacity(data.mesh.opacity, TensorReader(file));
   }
   read_scene(file, data);
-  if (file.tensors().contains(tensor::kSkyBegin)) {
+  if (has_part(file, tensor::kSkyBegin)) {
     visit_tensors_of_sky(data.sky_cells, TensorReader(file));
   }
   read_probes(file, data);
@@ -407,7 +422,7 @@ TransferData read_transfer_file(const SafetensorsFile& file) {
   data.surface_harmonics = read_surface_harmonics(file);
   data.receiver_rows = read_receiver_rows(file, tensor::kVertexRows);
   data.texel_rows = read_receiver_rows(file, tensor::kTexelRows);
-  if (file.tensors().contains(tensor::kEmittedIrradiance)) {
+  if (has_part(file, tensor::kEmittedIrradiance)) {
     const TensorReader read(file);
     read(tensor::kEmittedIrradiance, data.emitted_irradiance);
   }

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <random>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "tests/support/transfer_file_tampering.h"
 #include "tests/transfer/file/transfer_file_samples.h"
 #include "transfer/file/safetensors.h"
+#include "transfer/file/transfer_file_format.h"
 #include "transfer/file/transfer_file_io.h"
 
 namespace rebounce::test_damaged_file {
@@ -94,6 +96,47 @@ TEST(TransferFile, RefusesAFileCutShort) {
   for (std::size_t size = 0; size < file.size(); size += 97) {
     test::write_bytes(folder / "cut", file.substr(0, size));
     EXPECT_THROW(load_transfer_file(folder / "cut"), Error) << size;
+  }
+}
+
+/// The bytes of a file whose tensor `name` has lost its rows.
+std::string without_rows(const SafetensorsFile& file, const std::string& name) {
+  std::vector<TensorView> tensors;
+  for (const auto& [each, info] : file.tensors()) {
+    TensorView view{each, info.type, info.shape,
+                    file.data().subspan(info.begin, info.end - info.begin)};
+    if (each == name) {
+      view.shape[0] = 0;
+      view.bytes = {};
+    }
+    tensors.push_back(view);
+  }
+  std::string bytes;
+  write_safetensors(
+      [&](std::span<const std::byte> piece) {
+        bytes.append(reinterpret_cast<const char*>(piece.data()), piece.size());
+      },
+      lay_out_safetensors(tensors, file.metadata()));
+  reseal(bytes);
+  return bytes;
+}
+
+// Who asks whether a part is empty looks at one tensor, and must not find the others full.
+TEST(TransferFile, RefusesPartsWhoseFirstTensorIsEmpty) {
+  const test::TemporaryFolder folder;
+  save_transfer_file(folder / "whole", test::full_sample_data());
+  const SafetensorsFile whole(folder / "whole");
+  for (const char* part :
+       {tensor::kRowBegin, tensor::kSkyBegin, tensor::kOpacityMap, tensor::kEmittedIrradiance,
+        tensor::kProbePosition, tensor::kProbeSkyBegin, tensor::kSurfaceSky,
+        tensor::kSurfaceSkyBegin, tensor::kVertexRows.begin, tensor::kTexelRows.begin}) {
+    if (!whole.tensors().contains(part)) {
+      ADD_FAILURE() << part << " is not in the file";
+      continue;
+    }
+    test::write_bytes(folder / "damaged", without_rows(whole, part));
+    expect_error([&] { load_transfer_file(folder / "damaged"); },
+                 std::string("tensor ") + part + ": 0 rows, not at least 1");
   }
 }
 
