@@ -4,7 +4,7 @@
 #include "runtime/lights/lamp_kind.h"
 #include "runtime/rays/float3_glm.h"
 
-namespace rebounce {
+namespace rebounce::directional_lamp {
 namespace {
 
 static_assert(static_cast<int>(LightType::kDirectional) == REBOUNCE_LIGHT_DIRECTIONAL);
@@ -34,17 +34,17 @@ float directional_irradiance(vec3 to_lamp, vec3 direction, vec3 normal) {
 
 }  // namespace
 
-extern const LampKind kDirectionalLamp;
-constinit const LampKind kDirectionalLamp{.type = LightType::kDirectional,
-                                          .name = "directional",
-                                          .plural = "directional lights",
-                                          .unit = "lx",
-                                          .fields = kFields,
-                                          .shadow_map = ShadowMapKind::kPlane,
-                                          .prepare = prepare,
-                                          .evaluate = evaluate,
-                                          .evaluate_block = evaluate_block,
-                                          .surface = nullptr,
-                                          .glsl = kGlsl};
+extern const LampKind kKind;
+constinit const LampKind kKind{.type = LightType::kDirectional,
+                               .name = "directional",
+                               .plural = "directional lights",
+                               .unit = "lx",
+                               .fields = kFields,
+                               .shadow_map = ShadowMapKind::kPlane,
+                               .prepare = prepare,
+                               .evaluate = evaluate,
+                               .evaluate_block = evaluate_block,
+                               .surface = nullptr,
+                               .glsl = kGlsl};
 
-}  // namespace rebounce
+}  // namespace rebounce::directional_lamp

@@ -13,7 +13,7 @@
 #include "runtime/lights/lamp_kind.h"
 #include "runtime/rays/float3_glm.h"
 
-namespace rebounce {
+namespace rebounce::disc_lamp {
 namespace {
 
 static_assert(static_cast<int>(LightType::kDisc) == REBOUNCE_LIGHT_DISC);
@@ -223,18 +223,18 @@ constexpr LampSurface kSurface{.evaluate_places = evaluate_places,
 
 }  // namespace
 
-extern const LampKind kDiscLamp;
-constinit const LampKind kDiscLamp{.type = LightType::kDisc,
-                                   .name = "disc",
-                                   .plural = "discs",
-                                   .unit = "cd/m2",
-                                   .fields = kFields,
-                                   .shadow_map = ShadowMapKind::kPlaces,
-                                   .prepare = prepare,
-                                   .evaluate = nullptr,
-                                   .evaluate_block = nullptr,
-                                   .surface = &kSurface,
-                                   .glsl = kGlsl,
-                                   .shared_glsl = kFlatGlsl};
+extern const LampKind kKind;
+constinit const LampKind kKind{.type = LightType::kDisc,
+                               .name = "disc",
+                               .plural = "discs",
+                               .unit = "cd/m2",
+                               .fields = kFields,
+                               .shadow_map = ShadowMapKind::kPlaces,
+                               .prepare = prepare,
+                               .evaluate = nullptr,
+                               .evaluate_block = nullptr,
+                               .surface = &kSurface,
+                               .glsl = kGlsl,
+                               .shared_glsl = kFlatGlsl};
 
-}  // namespace rebounce
+}  // namespace rebounce::disc_lamp

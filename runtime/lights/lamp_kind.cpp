@@ -13,8 +13,25 @@
 
 namespace rebounce {
 
-extern const LampKind kPointLamp, kSpotLamp, kDirectionalLamp, kSphereLamp, kRectangleLamp,
-    kDiscLamp;
+// Each in a file of its own.
+namespace point_lamp {
+extern const LampKind kKind;
+}
+namespace spot_lamp {
+extern const LampKind kKind;
+}
+namespace directional_lamp {
+extern const LampKind kKind;
+}
+namespace sphere_lamp {
+extern const LampKind kKind;
+}
+namespace rectangle_lamp {
+extern const LampKind kKind;
+}
+namespace disc_lamp {
+extern const LampKind kKind;
+}
 
 namespace {
 
@@ -23,17 +40,17 @@ namespace {
 constexpr std::optional<const LampKind*> find(LightType type) {
   switch (type) {
     case LightType::kPoint:
-      return &kPointLamp;
+      return &point_lamp::kKind;
     case LightType::kSpot:
-      return &kSpotLamp;
+      return &spot_lamp::kKind;
     case LightType::kDirectional:
-      return &kDirectionalLamp;
+      return &directional_lamp::kKind;
     case LightType::kSphere:
-      return &kSphereLamp;
+      return &sphere_lamp::kKind;
     case LightType::kRectangle:
-      return &kRectangleLamp;
+      return &rectangle_lamp::kKind;
     case LightType::kDisc:
-      return &kDiscLamp;
+      return &disc_lamp::kKind;
   }
   return std::nullopt;
 }

@@ -2,7 +2,7 @@
 #include "runtime/lights/lamp_geometry.h"
 #include "runtime/lights/lamp_kind.h"
 
-namespace rebounce {
+namespace rebounce::point_lamp {
 namespace {
 
 static_assert(static_cast<int>(LightType::kPoint) == REBOUNCE_LIGHT_POINT);
@@ -29,17 +29,17 @@ float point_irradiance(vec3 to_lamp, vec3 direction, vec3 normal) {
 
 }  // namespace
 
-extern const LampKind kPointLamp;
-constinit const LampKind kPointLamp{.type = LightType::kPoint,
-                                    .name = "point",
-                                    .plural = "points",
-                                    .unit = "cd",
-                                    .fields = kFields,
-                                    .shadow_map = ShadowMapKind::kCube,
-                                    .prepare = prepare_profile,
-                                    .evaluate = evaluate,
-                                    .evaluate_block = evaluate_block,
-                                    .surface = nullptr,
-                                    .glsl = kGlsl};
+extern const LampKind kKind;
+constinit const LampKind kKind{.type = LightType::kPoint,
+                               .name = "point",
+                               .plural = "points",
+                               .unit = "cd",
+                               .fields = kFields,
+                               .shadow_map = ShadowMapKind::kCube,
+                               .prepare = prepare_profile,
+                               .evaluate = evaluate,
+                               .evaluate_block = evaluate_block,
+                               .surface = nullptr,
+                               .glsl = kGlsl};
 
-}  // namespace rebounce
+}  // namespace rebounce::point_lamp

@@ -12,7 +12,7 @@
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/polygon_form_factor.h"
 
-namespace rebounce {
+namespace rebounce::rectangle_lamp {
 namespace {
 
 static_assert(static_cast<int>(LightType::kRectangle) == REBOUNCE_LIGHT_RECTANGLE);
@@ -166,18 +166,18 @@ constexpr LampSurface kSurface{.evaluate_places = evaluate_places,
 
 }  // namespace
 
-extern const LampKind kRectangleLamp;
-constinit const LampKind kRectangleLamp{.type = LightType::kRectangle,
-                                        .name = "rectangle",
-                                        .plural = "rectangles",
-                                        .unit = "cd/m2",
-                                        .fields = kFields,
-                                        .shadow_map = ShadowMapKind::kPlaces,
-                                        .prepare = prepare,
-                                        .evaluate = nullptr,
-                                        .evaluate_block = nullptr,
-                                        .surface = &kSurface,
-                                        .glsl = kGlsl,
-                                        .shared_glsl = kFlatGlsl};
+extern const LampKind kKind;
+constinit const LampKind kKind{.type = LightType::kRectangle,
+                               .name = "rectangle",
+                               .plural = "rectangles",
+                               .unit = "cd/m2",
+                               .fields = kFields,
+                               .shadow_map = ShadowMapKind::kPlaces,
+                               .prepare = prepare,
+                               .evaluate = nullptr,
+                               .evaluate_block = nullptr,
+                               .surface = &kSurface,
+                               .glsl = kGlsl,
+                               .shared_glsl = kFlatGlsl};
 
-}  // namespace rebounce
+}  // namespace rebounce::rectangle_lamp

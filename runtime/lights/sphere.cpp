@@ -12,7 +12,7 @@
 #include "runtime/lights/lamp_kind.h"
 #include "runtime/rays/float3_glm.h"
 
-namespace rebounce {
+namespace rebounce::sphere_lamp {
 namespace {
 
 constexpr float kPi = std::numbers::pi_v<float>;
@@ -220,17 +220,17 @@ constexpr LampSurface kSurface{.evaluate_places = evaluate_places,
 
 }  // namespace
 
-extern const LampKind kSphereLamp;
-constinit const LampKind kSphereLamp{.type = LightType::kSphere,
-                                     .name = "sphere",
-                                     .plural = "spheres",
-                                     .unit = "cd/m2",
-                                     .fields = kFields,
-                                     .shadow_map = ShadowMapKind::kPlaces,
-                                     .prepare = prepare,
-                                     .evaluate = nullptr,
-                                     .evaluate_block = nullptr,
-                                     .surface = &kSurface,
-                                     .glsl = kGlsl};
+extern const LampKind kKind;
+constinit const LampKind kKind{.type = LightType::kSphere,
+                               .name = "sphere",
+                               .plural = "spheres",
+                               .unit = "cd/m2",
+                               .fields = kFields,
+                               .shadow_map = ShadowMapKind::kPlaces,
+                               .prepare = prepare,
+                               .evaluate = nullptr,
+                               .evaluate_block = nullptr,
+                               .surface = &kSurface,
+                               .glsl = kGlsl};
 
-}  // namespace rebounce
+}  // namespace rebounce::sphere_lamp

@@ -8,7 +8,7 @@
 #include "runtime/lights/lamp_kind.h"
 #include "runtime/rays/float3_glm.h"
 
-namespace rebounce {
+namespace rebounce::spot_lamp {
 namespace {
 
 static_assert(static_cast<int>(LightType::kSpot) == REBOUNCE_LIGHT_SPOT);
@@ -73,18 +73,18 @@ float spot_irradiance(vec3 to_lamp, vec3 direction, vec3 normal) {
 
 }  // namespace
 
-extern const LampKind kSpotLamp;
-constinit const LampKind kSpotLamp{.type = LightType::kSpot,
-                                   .name = "spot",
-                                   .plural = "spots",
-                                   .unit = "cd",
-                                   .fields = kFields,
-                                   .shadow_map = ShadowMapKind::kCube,
-                                   .prepare = prepare,
-                                   .evaluate = evaluate,
-                                   .evaluate_block = evaluate_block,
-                                   .surface = nullptr,
-                                   .may_reach = may_reach,
-                                   .glsl = kGlsl};
+extern const LampKind kKind;
+constinit const LampKind kKind{.type = LightType::kSpot,
+                               .name = "spot",
+                               .plural = "spots",
+                               .unit = "cd",
+                               .fields = kFields,
+                               .shadow_map = ShadowMapKind::kCube,
+                               .prepare = prepare,
+                               .evaluate = evaluate,
+                               .evaluate_block = evaluate_block,
+                               .surface = nullptr,
+                               .may_reach = may_reach,
+                               .glsl = kGlsl};
 
-}  // namespace rebounce
+}  // namespace rebounce::spot_lamp

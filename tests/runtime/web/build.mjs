@@ -31,7 +31,8 @@ writeFileSync(join(page, 'drawing.html'), `<!doctype html><link rel="icon" href=
 <script type="module" src="drawing.js"></script>`);
 const scene = join(folder, 'cornell_box.safetensors');
 const precomputeFile = (path, file, ...options) => run(
-    program, 'precompute', path, '--patches', '500', '--quiet', '-o', file, ...options);
+    program, 'precompute', path, '--patches', '500', '--quality', 'low', '--quiet', '-o', file,
+    ...options);
 const precompute = (name, ...rest) => precomputeFile(`tests/scenes/${name}.gltf`, ...rest);
 precompute('cornell_box', scene);
 precompute('cornell_box', join(page, 'scenes/cornell_box.safetensors'), '--for', 'web',
