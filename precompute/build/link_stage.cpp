@@ -6,8 +6,8 @@
 #include "precompute/base/ranks.h"
 #include "precompute/build/build_estimate.h"
 #include "precompute/build/exchange_stage.h"
+#include "precompute/build/link_checkpoint.h"
 #include "precompute/build/operator_stage.h"
-#include "precompute/compression/block_checkpoint.h"
 #include "precompute/exchange/links/links.h"
 #include "precompute/lights/link_error.h"
 
@@ -29,15 +29,16 @@ constexpr double kErrorPower = 0.7, kCountPower = 0.5;
 // error down, it is not what binds, and links are not made again.
 constexpr double kLeastStep = 0.3, kMostStep = 0.7, kLeastGain = 0.85;
 
-/// Patches and mesh of a model, as long as the object lives in the data of a build.
+/// Patches and mesh of a model, and their links, as long as the object lives in the data of a
+/// build.
 class LentPatches {
  public:
-  LentPatches(PatchModel& model, const EscapedLight& escaped, TransferData& data)
-      : model_(model), data_(data) {
+  LentPatches(PatchModel& model, LinkBuild& build, TransferData& data)
+      : model_(model), build_(build), data_(data) {
     exchange();
-    data.patches.sky_visibility = escaped.sky_visibility;
-    data.patches.absorbed = escaped.absorbed;
-    data.sky_cells = escaped.sky_cells;
+    data.patches.sky_visibility = build.sky_visibility;
+    data.patches.absorbed = build.absorbed;
+    data.sky_cells = build.sky_cells;
   }
   ~LentPatches() { exchange(); }
   LentPatches(const LentPatches&) = delete;
@@ -47,9 +48,11 @@ class LentPatches {
   void exchange() {
     std::swap(model_.patches, data_.patches);
     std::swap(model_.mesh, data_.mesh);
+    std::swap(build_.links, data_.links);
   }
 
   PatchModel& model_;
+  LinkBuild& build_;
   TransferData& data_;
 };
 
@@ -73,22 +76,16 @@ bool finer_fit(const PatchModel& model, const PatchRoles& roles, const BuildSett
   return std::max(peak_bytes_of_links(build), peak_bytes_after_links(build, limit)) <= limit;
 }
 
-/// Makes links, and while they are `judged`, finer ones from them until they are near enough. The
-/// last are in the data.
+/// Makes links, and while they are `judged`, finer ones from them until they are near enough.
 LinkBuild near_enough_links(PatchModel& model, const RayTracer& tracer, const PatchRoles& roles,
                             bool judged, BuildSettings& decided, TransferData& data,
-                            BuildReport& report, PhaseClock& clock) {
+                            PhaseClock& clock) {
   double& epsilon = decided.form_factors.link_epsilon;
   LinkBuilder builder(model, tracer, decided.form_factors);
   double last_error = 0;
   for (int round = 1;; ++round) {
     LinkBuild build = clock.run(round == 1 ? "form factors" : "finer links",
                                 [&](const Progress& part) { return builder.build(epsilon, part); });
-    report.ray_count = build.ray_count;
-    report.pair_count = build.candidate_count;
-    report.link_count = build.links.pair.size();
-    report.closure = build.closure;
-    data.links = std::move(build.links);
     if (!judged || round == kMostRounds) return build;
     const double error = clock.run("check of links", [&](const Progress& part) {
       const LentPatches lent(model, build, data);
@@ -99,11 +96,11 @@ LinkBuild near_enough_links(PatchModel& model, const RayTracer& tracer, const Pa
     if (error <= kAccepted * decided.tolerance || !helps) return build;
     const double finer = finer_epsilon(epsilon, error, decided.tolerance);
     // Ranks may have different limits, and go the same way.
-    const bool fits = finer_fit(model, roles, decided, builder, report.link_count, finer / epsilon);
+    const bool fits =
+        finer_fit(model, roles, decided, builder, build.links.pair.size(), finer / epsilon);
     if (Ranks().least(fits ? 1 : 0) == 0) return build;
     epsilon = finer;
     last_error = error;
-    data.links = {};
   }
 }
 
@@ -112,9 +109,18 @@ LinkBuild near_enough_links(PatchModel& model, const RayTracer& tracer, const Pa
 EscapedLight find_links(PatchModel& model, const RayTracer& tracer, const PatchRoles& roles,
                         bool judged, BuildSettings& decided, TransferData& data,
                         BuildReport& report, PhaseClock& clock) {
-  const BlockCheckpoint can_be_made(decided.checkpoint, {});  // throws if it cannot
-  LinkBuild build = near_enough_links(model, tracer, roles, judged, decided, data, report, clock);
-  return_freed_memory();  // of what finer links would have been made from
+  const Checkpoint checkpoint(decided.checkpoint, identity_of_links(model, roles, judged, decided));
+  LinkBuild build;
+  if (!find_kept_links(checkpoint, build, decided.form_factors.link_epsilon)) {
+    build = near_enough_links(model, tracer, roles, judged, decided, data, clock);
+    return_freed_memory();  // of what finer links would have been made from
+    if (Ranks().rank() == 0) keep_links(checkpoint, build, decided.form_factors.link_epsilon);
+  }
+  report.ray_count = build.ray_count;
+  report.pair_count = build.candidate_count;
+  report.link_count = build.links.pair.size();
+  report.closure = build.closure;
+  data.links = std::move(build.links);
   return build;
 }
 

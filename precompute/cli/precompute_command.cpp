@@ -444,8 +444,8 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
           "in smaller parts. By default half of the machine's memory")
       ->check(CLI::PositiveNumber);
   command->add_option("--checkpoint", chosen->settings.checkpoint,
-                      "Folder for finished parts of an operator from links: a run that was killed "
-                      "continues when it is started again. Remove the folder afterwards");
+                      "Folder for links and finished parts of their operator: a run that was "
+                      "killed continues when it is started again. Remove the folder afterwards");
   command->callback([chosen, &options] { run(*chosen, options); });
 }
 

@@ -5,30 +5,24 @@
 #include <string>
 #include <utility>
 
+#include "precompute/base/checkpoint.h"
 #include "precompute/compression/block_tree.h"
 
 namespace rebounce {
 
-/// Keeps parts of an operator in a folder, one file each, until the operator is complete.
-///
-/// A file is written whole or not at all. It begins with a hash of its name and of the `key` that
-/// it was made for, and a hash of its content. A part that was made for another key, has another
-/// name, is damaged or is no such file counts as missing. Rank 0 reads, and gives the others what
-/// it has found.
+/// A checkpoint (Checkpoint) whose parts are those of an operator.
 class BlockCheckpoint {
  public:
   /// Keeps nothing.
   BlockCheckpoint() = default;
 
-  /// Makes the folder if it does not exist; an empty path keeps nothing. `key` is a hash of all
-  /// that the parts depend on. Throws Error if the path exists and is no folder, or the folder
-  /// cannot be made.
-  BlockCheckpoint(std::filesystem::path folder, std::string key);
+  /// As for Checkpoint.
+  BlockCheckpoint(std::filesystem::path folder, std::string key)
+      : parts_(std::move(folder), std::move(key)) {}
 
-  bool keeps() const { return !folder_.empty(); }
+  bool keeps() const { return parts_.keeps(); }
 
-  /// Writes the part called `name`, which is also the name of its file. Throws Error if it cannot
-  /// be written.
+  /// Writes the part called `name`, without its cost. Throws Error if it cannot be written.
   void keep(const std::string& name, const BlockPart& part) const;
 
   /// The part called `name`, if it is there. All ranks call it.
@@ -45,10 +39,7 @@ class BlockCheckpoint {
   }
 
  private:
-  std::optional<BlockPart> read(const std::string& name) const;
-
-  std::filesystem::path folder_;
-  std::string key_;
+  Checkpoint parts_;
 };
 
 }  // namespace rebounce

@@ -196,9 +196,9 @@ struct BuildSettings {
   /// Refuses to start what needs more, bytes; 0: half of the machine's memory. With links, a lower
   /// limit means that less of the operator is made at a time: slower, with the same bits.
   std::uint64_t memory_limit_bytes = 0;
-  /// With kLinks: folder that what is done of the operator is kept in, so that a build that was
-  /// killed has that done when it is started again with the same scene and settings. It stays
-  /// behind. Empty: none.
+  /// With kLinks: folder that the links, and what is done of the operator, are kept in, so that a
+  /// build that was killed has that done when it is started again with the same scene and settings.
+  /// It stays behind. Empty: none.
   std::filesystem::path checkpoint;
 };
 

@@ -3,12 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <string>
 
 #include "precompute/build/build_decisions.h"
 #include "precompute/build/exchange_stage.h"
 #include "precompute/lights/random_lights.h"
 #include "precompute/lights/reference_solution.h"
+#include "tests/support/temporary_folder.h"
 #include "tests/support/test_scenes.h"
 #include "transfer/base/area_norm.h"
 
@@ -105,6 +107,60 @@ TEST(LinkStage, LeavesLinksOfWhichFinerOnesDoNotFit) {
   EXPECT_EQ(found.phases("check of links"), 1);
   EXPECT_EQ(found.phases("finer links"), 0);
   EXPECT_FALSE(found.data.links.empty());
+}
+
+void expect_same(const FormFactorLinks& a, const FormFactorLinks& b) {
+  EXPECT_EQ(a.patch, b.patch);
+  EXPECT_EQ(a.first_child, b.first_child);
+  EXPECT_EQ(a.count, b.count);
+  EXPECT_EQ(a.pair, b.pair);
+  EXPECT_EQ(a.exchange_area, b.exchange_area);
+  EXPECT_EQ(a.gradient, b.gradient);
+  EXPECT_EQ(a.scale, b.scale);
+}
+
+void expect_same(const Found& a, const Found& b) {
+  expect_same(a.data.links, b.data.links);
+  EXPECT_EQ(a.escaped.sky_visibility, b.escaped.sky_visibility);
+  EXPECT_EQ(a.escaped.absorbed, b.escaped.absorbed);
+  EXPECT_EQ(a.escaped.sky_cells.entry_begin, b.escaped.sky_cells.entry_begin);
+  EXPECT_EQ(a.escaped.sky_cells.entry_cell, b.escaped.sky_cells.entry_cell);
+  EXPECT_EQ(a.escaped.sky_cells.entry_part, b.escaped.sky_cells.entry_part);
+  EXPECT_EQ(a.decided.form_factors.link_epsilon, b.decided.form_factors.link_epsilon);
+  EXPECT_EQ(a.report.ray_count, b.report.ray_count);
+  EXPECT_EQ(a.report.pair_count, b.report.pair_count);
+  EXPECT_EQ(a.report.link_count, b.report.link_count);
+  EXPECT_EQ(a.report.closure.row_sum_error_before, b.report.closure.row_sum_error_before);
+  EXPECT_EQ(a.report.closure.row_sum_error_after, b.report.closure.row_sum_error_after);
+  EXPECT_EQ(a.report.closure.relative_change, b.report.closure.relative_change);
+}
+
+TEST(LinkStage, GoesOnFromItsCheckpointWithTheSameBits) {
+  const test::TemporaryFolder folder;
+  BuildSettings settings = from_links(kCoarseLinks);
+  const Found uninterrupted(settings);
+  settings.checkpoint = folder.path();
+  const Found first(settings), again(settings);
+  EXPECT_GE(first.phases("finer links"), 1);
+  EXPECT_TRUE(again.report.seconds.empty()) << "links were found anew";
+  expect_same(first, uninterrupted);
+  expect_same(again, uninterrupted);
+}
+
+TEST(LinkStage, FindsLinksAnewForOtherSettingsAndWhereTheCheckpointIsDamaged) {
+  const test::TemporaryFolder folder;
+  BuildSettings settings = from_links(kCoarseLinks);
+  settings.checkpoint = folder.path();
+  const Found first(settings, false);
+  BuildSettings other = settings;
+  other.form_factors.seed = 2;
+  EXPECT_EQ(Found(other, false).phases("form factors"), 1);
+  EXPECT_EQ(Found(settings, true).phases("form factors"), 1) << "judged";
+  EXPECT_EQ(Found(settings, true).phases("form factors"), 0);
+  std::filesystem::resize_file(folder / "links", 1000);
+  const Found anew(settings, false);
+  EXPECT_EQ(anew.phases("form factors"), 1);
+  expect_same(anew, first);
 }
 
 TEST(LinkStage, GivesPatchesAndMeshBack) {
