@@ -112,7 +112,7 @@ def readme_line(report):
         f"to {results.percent(aims.AIM_ERROR)}, the product is {span(switches)} times faster than Gauss-Seidel (median {times(statistics.median(switches))}), "
         f"{span([h.warm for h in report.headlines])} times after a lamp moved a little, and "
         f"{span([h.switch_any for h in report.headlines])} times faster than the best iteration of any kind. "
-        f"After a repaint, when the product must be refined, iteration takes {span(repainted)} of its time. "
+        f"Once surfaces are repainted the operator only helps to refine, and iteration takes {span(repainted)} of the time of that. "
         f"[All figures, and where Gauss-Seidel wins]({PAGE})."
     )
 
