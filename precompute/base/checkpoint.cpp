@@ -50,6 +50,7 @@ Checkpoint::Checkpoint(std::filesystem::path folder, std::string key)
     throw Error(folder_.string() +
                 ": cannot be created as a folder for checkpoints; choose another path");
   }
+  if (Ranks().rank() == 0) const AtomicFile never_committed(folder_ / "checkpoint");
 }
 
 void Checkpoint::write(const std::string& name,

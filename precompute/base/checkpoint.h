@@ -26,8 +26,8 @@ class Checkpoint {
   Checkpoint() = default;
 
   /// Makes the folder if it does not exist; an empty path keeps nothing. `key` is a hash of all
-  /// that the parts depend on. Throws Error if the path exists and is no folder, or the folder
-  /// cannot be made.
+  /// that the parts depend on. Throws Error if the path exists and is no folder, the folder cannot
+  /// be made, or rank 0 cannot write to it.
   Checkpoint(std::filesystem::path folder, std::string key);
 
   bool keeps() const { return !folder_.empty(); }

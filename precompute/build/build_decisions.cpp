@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "precompute/base/checkpoint.h"
 #include "precompute/base/ranks.h"
 #include "precompute/build/build_estimate.h"
 #include "precompute/build/operator_stage.h"
@@ -126,6 +127,11 @@ BuildSettings decide(BuildSettings settings, const PatchModel& model) {
   if (!links && link_epsilon > 0) {
     throw Error("--link-epsilon is for form factors from links; add --form-factors links");
   }
+  if (!links && !settings.checkpoint.empty()) {
+    throw Error(
+        "--checkpoint keeps parts of builds from links; leave it out, or add --form-factors links");
+  }
+  const Checkpoint is_writable(settings.checkpoint, "");  // refused before the work begins
   if (links && link_epsilon == 0) {
     link_epsilon = kLinkEpsilon * (settings.tolerance / kDefaultTolerance);
   }

@@ -2,11 +2,13 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <tuple>
 #include <type_traits>
 #include <vector>
 
 #include "precompute/base/identity.h"
+#include "precompute/base/ranks.h"
 
 namespace rebounce {
 namespace {
@@ -16,6 +18,7 @@ constexpr char kName[] = "links";
 /// What links are beside their arrays.
 struct Numbers {
   double epsilon = 0;
+  LinkLimits limits;
   ClosureReport closure;
   std::uint64_t ray_count = 0, candidate_count = 0;
 };
@@ -43,26 +46,35 @@ std::string identity_of_links(const PatchModel& model, const PatchRoles& roles, 
                mesh.opacity.triangle_map, mesh.opacity.begin, mesh.opacity.opacity,
                model.shown_patch);
   const FormFactorSettings& f = decided.form_factors;
-  identity.add(std::array{f.seed, decided.memory_limit_bytes, std::uint64_t{judged}},
+  identity.add(std::array{f.seed, std::uint64_t{judged}},
                std::array{f.probe_rays, f.full_rays, f.hemisphere_rays},
                std::array{f.kernel_tolerance, f.link_epsilon, decided.tolerance});
   return identity.text();
 }
 
-void keep_links(const Checkpoint& checkpoint, const LinkBuild& build, double epsilon) {
+void keep_links(const Checkpoint& checkpoint, const JudgedLinks& links) {
+  const LinkBuild& build = links.build;
   const std::vector<Numbers> numbers = {
-      {epsilon, build.closure, build.ray_count, build.candidate_count}};
+      {links.epsilon, links.limits, build.closure, build.ray_count, build.candidate_count}};
   std::apply([&](const auto&... arrays) { checkpoint.keep(kName, numbers, arrays...); },
              arrays_of(build));
 }
 
-bool find_kept_links(const Checkpoint& checkpoint, LinkBuild& build, double& epsilon) {
+bool find_kept_links(const Checkpoint& checkpoint, std::uint64_t memory_limit_bytes,
+                     JudgedLinks& links) {
+  Ranks().share(std::span(&memory_limit_bytes, 1));  // item 0 is that of rank 0
   std::vector<Numbers> numbers;
+  LinkBuild& build = links.build;
   const bool found =
       std::apply([&](auto&... arrays) { return checkpoint.find(kName, numbers, arrays...); },
                  arrays_of(build));
-  if (!found) return false;
-  epsilon = numbers.at(0).epsilon;
+  if (!found || memory_limit_bytes < numbers.at(0).limits.least ||
+      memory_limit_bytes >= numbers[0].limits.end) {
+    links = {};
+    return false;
+  }
+  links.epsilon = numbers[0].epsilon;
+  links.limits = numbers[0].limits;
   build.closure = numbers[0].closure;
   build.ray_count = numbers[0].ray_count;
   build.candidate_count = numbers[0].candidate_count;

@@ -62,43 +62,56 @@ double finer_epsilon(double epsilon, double error, double tolerance) {
   return epsilon * std::clamp(wanted, kLeastStep, kMostStep);
 }
 
-/// True if as many links as epsilon times `step` gives fit into the memory limit, where `builder`
-/// has made `link_count` and nothing else holds them.
-bool finer_fit(const PatchModel& model, const PatchRoles& roles, const BuildSettings& decided,
-               const LinkBuilder& builder, std::size_t link_count, double step) {
+/// The memory that as many links as epsilon times `step` gives need, where `builder` has made
+/// `link_count` and nothing else holds them.
+std::uint64_t bytes_of_finer(const PatchModel& model, const PatchRoles& roles,
+                             const BuildSettings& decided, const LinkBuilder& builder, std::size_t link_count, double step) {
   const double finer = static_cast<double>(link_count) * std::pow(step, -kCountPower);
   LinkedBuild build =
       linked_build(built_scene(model.patches.size(), model.mesh), link_count,
                    model.patches.reflectance, roles, kCompressionPart * decided.tolerance);
   build.link_count = static_cast<std::size_t>(finer);
   build.held_bytes -= std::min(build.held_bytes, builder.held_bytes());
-  const std::uint64_t limit = decided.memory_limit_bytes;
-  return std::max(peak_bytes_of_links(build), peak_bytes_after_links(build, limit)) <= limit;
+  return std::max(peak_bytes_of_links(build),
+                  peak_bytes_after_links(build, decided.memory_limit_bytes));
+}
+
+/// Whether finer links that need so many bytes are made. Ranks may have different limits, and go
+/// the same way.
+bool finer_fit(std::uint64_t bytes, std::uint64_t limit, LinkLimits& limits) {
+  const bool fits = Ranks().least(bytes <= limit ? 1 : 0) != 0;
+  if (fits) limits.least = std::max(limits.least, std::min(bytes, limit));
+  if (!fits) limits.end = std::max(bytes, limit + 1);
+  return fits;
 }
 
 /// Makes links, and while they are `judged`, finer ones from them until they are near enough.
-LinkBuild near_enough_links(PatchModel& model, const RayTracer& tracer, const PatchRoles& roles,
-                            bool judged, BuildSettings& decided, TransferData& data,
-                            PhaseClock& clock) {
-  double& epsilon = decided.form_factors.link_epsilon;
+JudgedLinks near_enough_links(PatchModel& model, const RayTracer& tracer, const PatchRoles& roles,
+                              bool judged, const BuildSettings& decided, TransferData& data,
+                              PhaseClock& clock) {
+  double epsilon = decided.form_factors.link_epsilon;
+  LinkLimits limits;
   LinkBuilder builder(model, tracer, decided.form_factors);
   double last_error = 0;
   for (int round = 1;; ++round) {
     LinkBuild build = clock.run(round == 1 ? "form factors" : "finer links",
                                 [&](const Progress& part) { return builder.build(epsilon, part); });
-    if (!judged || round == kMostRounds) return build;
+    if (!judged || round == kMostRounds) return {std::move(build), epsilon, limits};
     const double error = clock.run("check of links", [&](const Progress& part) {
       const LentPatches lent(model, build, data);
       return error_of_links(data, model.shown_patch, tracer, roles, decided.form_factors.seed, part)
           .mean;
     });
     const bool helps = round == 1 || error < kLeastGain * last_error;
-    if (error <= kAccepted * decided.tolerance || !helps) return build;
+    const bool is_last = error <= kAccepted * decided.tolerance || !helps;
     const double finer = finer_epsilon(epsilon, error, decided.tolerance);
-    // Ranks may have different limits, and go the same way.
-    const bool fits =
-        finer_fit(model, roles, decided, builder, build.links.pair.size(), finer / epsilon);
-    if (Ranks().least(fits ? 1 : 0) == 0) return build;
+    const auto bytes_needed = [&] {
+      return bytes_of_finer(model, roles, decided, builder, build.links.pair.size(),
+                            finer / epsilon);
+    };
+    if (is_last || !finer_fit(bytes_needed(), decided.memory_limit_bytes, limits)) {
+      return {std::move(build), epsilon, limits};
+    }
     epsilon = finer;
     last_error = error;
   }
@@ -110,18 +123,20 @@ EscapedLight find_links(PatchModel& model, const RayTracer& tracer, const PatchR
                         bool judged, BuildSettings& decided, TransferData& data,
                         BuildReport& report, PhaseClock& clock) {
   const Checkpoint checkpoint(decided.checkpoint, identity_of_links(model, roles, judged, decided));
-  LinkBuild build;
-  if (!find_kept_links(checkpoint, build, decided.form_factors.link_epsilon)) {
-    build = near_enough_links(model, tracer, roles, judged, decided, data, clock);
+  JudgedLinks links;
+  if (!find_kept_links(checkpoint, decided.memory_limit_bytes, links)) {
+    links = near_enough_links(model, tracer, roles, judged, decided, data, clock);
     return_freed_memory();  // of what finer links would have been made from
-    if (Ranks().rank() == 0) keep_links(checkpoint, build, decided.form_factors.link_epsilon);
+    if (Ranks().rank() == 0) keep_links(checkpoint, links);
   }
+  decided.form_factors.link_epsilon = links.epsilon;
+  LinkBuild& build = links.build;
   report.ray_count = build.ray_count;
   report.pair_count = build.candidate_count;
   report.link_count = build.links.pair.size();
   report.closure = build.closure;
   data.links = std::move(build.links);
-  return build;
+  return std::move(build);
 }
 
 std::size_t forecast_links(const PatchModel& model, const RayTracer& tracer,

@@ -215,7 +215,7 @@ class LinkedOperator {
           draw_fitting_lights(data_, tracer_, decided_.form_factors.seed, roles_);
       return solved_->compress(lights.view(), kCompressionPart * finer, part);
     });
-    check(decided_.form_factors.seed + 1);
+    check(seed_of_second_check(decided_.form_factors.seed));
   }
 
   const RayTracer& tracer_;

@@ -108,8 +108,7 @@ void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& deci
   data.transfer = clock.run("compression again", [&](const Progress& part) {
     return compress(*dense, data, tracer, again, roles, part);
   });
-  // Lights that the first check has not seen: its groups have seeds that follow each other.
-  check_operator(data, tracer, dense.get(), decided, ~seed, report, clock);
+  check_operator(data, tracer, dense.get(), decided, seed_of_second_check(seed), report, clock);
 }
 
 }  // namespace rebounce

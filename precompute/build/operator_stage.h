@@ -34,6 +34,11 @@ inline constexpr double kLinksPart = 0.6, kCompressionPart = 0.8;
 /// Lights that compressed form factors are measured under.
 inline constexpr int kFormFactorLightCount = 16;
 
+/// The seed of a second check, whose lights a first one with `seed` has not seen.
+inline std::uint64_t seed_of_second_check(std::uint64_t seed) {
+  return ~seed;
+}
+
 /// The precision of the dense inverse that an operator of this kind is made from.
 inline Arithmetic arithmetic_of(OperatorKind kind) {
   return kind == OperatorKind::kDense ? Arithmetic::kDouble : Arithmetic::kSingle;

@@ -3,15 +3,34 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "rebounce/error.h"
 #include "runtime/frame/lamp_warnings.h"
 #include "runtime/lights/emitting_material.h"
+#include "transfer/base/argument_check.h"
 #include "transfer/file/transfer_file_io.h"
 
 namespace rebounce::cli {
 namespace {
+
+/// Metres per unit of the scene file that `data` were made from.
+double scale_of(const TransferData& data) {
+  const auto settings = nlohmann::json::parse(data.settings_json, nullptr, false);
+  if (!settings.is_object() || !settings.contains("scale")) return 1;
+  const auto& scale = settings["scale"];
+  return scale.is_number() && scale.get<double>() > 0 ? scale.get<double>() : 1;
+}
+
+/// Multiplies light by a scale. Throws Error if that is not finite any more.
+void multiply(Float3& light, const EmitterScale& emitter) {
+  for (int c = 0; c < kChannelCount; ++c) light[c] *= emitter.scale[c];
+  if (!is_light(light)) {
+    throw Error(fmt::format("\"emitters\": the scale of \"{}\" makes light that is not finite",
+                            emitter.material));
+  }
+}
 
 /// Scales the emission of a material. Throws Error if the scene has no material of that name.
 void scale_emitter(const EmitterScale& emitter, std::span<const std::uint32_t> patch_material,
@@ -20,11 +39,9 @@ void scale_emitter(const EmitterScale& emitter, std::span<const std::uint32_t> p
   for (std::uint32_t m = 0; m < data.materials.size(); ++m) {
     if (data.materials[m].name != emitter.material) continue;
     found = true;
-    for (int c = 0; c < kChannelCount; ++c) {
-      data.materials[m].emitted_luminance[c] *= emitter.scale[c];
-      for (std::size_t i = 0; i < patch_material.size(); ++i) {
-        if (patch_material[i] == m) data.patches.emitted_exitance[i][c] *= emitter.scale[c];
-      }
+    multiply(data.materials[m].emitted_luminance, emitter);
+    for (std::size_t i = 0; i < patch_material.size(); ++i) {
+      if (patch_material[i] == m) multiply(data.patches.emitted_exitance[i], emitter);
     }
   }
   if (!found) {
@@ -40,7 +57,7 @@ LightSetup choose_lights(const std::filesystem::path& path, const TransferData& 
   if (path.empty()) {
     setup.lights = data.lights;
   } else {
-    setup = read_lights(path);
+    setup = read_lights(path, scale_of(data));
   }
   const bool emits = std::ranges::any_of(data.patches.emitted_exitance, [](const Float3& m) {
     return m[0] > 0 || m[1] > 0 || m[2] > 0;

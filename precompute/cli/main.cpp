@@ -10,14 +10,13 @@
 
 #include "precompute/cli/commands.h"
 #include "precompute/cli/console.h"
+#include "precompute/cli/out_of_memory.h"
 #include "rebounce/error.h"
 #include "rebounce/version.h"
 
 namespace {
 
 constexpr int kBadInput = 1, kUsage = 2;
-
-constexpr const char* kOutOfMemory = "rebounce: out of memory; ask for fewer patches\n";
 
 void add_common_options(CLI::App& command, rebounce::cli::CommonOptions& options) {
   command.add_flag(
@@ -45,6 +44,13 @@ std::string usage_message(const CLI::App& app, const CLI::ParseError& error) {
   std::string command = "rebounce";
   for (const CLI::App* chosen : app.get_subcommands()) command += " " + chosen->get_name();
   return fmt::format("{}; see {} --help", what, command);
+}
+
+/// Takes no memory.
+void say_out_of_memory() {
+  std::fputs("rebounce: ", stderr);
+  std::fputs(rebounce::cli::kOutOfMemory, stderr);
+  std::fputs("\n", stderr);
 }
 
 int run(int argc, char** argv) {
@@ -83,7 +89,7 @@ const std::terminate_handler kUsualHandler = std::get_terminate();
       std::rethrow_exception(exception);
     }
   } catch (const std::bad_alloc&) {
-    std::fputs(kOutOfMemory, stderr);
+    say_out_of_memory();
     std::_Exit(kBadInput);
   } catch (...) {
   }
@@ -99,7 +105,7 @@ int main(int argc, char** argv) {
   try {
     return run(argc, argv);
   } catch (const std::bad_alloc&) {
-    std::fputs(kOutOfMemory, stderr);
+    say_out_of_memory();
   } catch (const std::exception& error) {
     std::fputs(("rebounce: " + std::string(error.what()) + "\n").c_str(), stderr);
   }

@@ -1,16 +1,18 @@
 #include "precompute/cli/mpi_ranks.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <cstdlib>
 #include <initializer_list>
+#include <new>
 #include <thread>
 
 #ifdef REBOUNCE_WITH_MPI
 #include <mpi.h>
 #endif
+
+#include "precompute/cli/out_of_memory.h"
 
 namespace rebounce::cli {
 namespace {
@@ -69,11 +71,13 @@ std::unique_ptr<MpiRanks> join_ranks() {
 }
 
 void end_all(MpiRanks& ranks, const std::exception& error) {
+  const bool has_no_memory = dynamic_cast<const std::bad_alloc*>(&error) != nullptr;
+  const char* what = has_no_memory ? kOutOfMemory : error.what();
   if (ranks.rank() == 0) {
-    fmt::print(stderr, "rebounce: {}\n", error.what());
+    std::fprintf(stderr, "rebounce: %s\n", what);
   } else {
     std::this_thread::sleep_for(std::chrono::seconds(2));  // rank 0 ends this one if it fails too
-    fmt::print(stderr, "rebounce: rank {}: {}\n", ranks.rank(), error.what());
+    std::fprintf(stderr, "rebounce: rank %zu: %s\n", ranks.rank(), what);
   }
   std::fflush(stderr);
   ranks.abort(1);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <numbers>
 #include <string_view>
 #include <vector>
@@ -68,7 +69,7 @@ ChosenCamera choose_camera(const std::string& wanted, const TransferData& data,
     if (camera.name == wanted) return {camera, CameraSource::kScene};
   }
   const std::vector<float> n = parse_numbers(wanted);
-  if (n.size() == 1 && n[0] >= 0 && n[0] < static_cast<float>(count)) {
+  if (n.size() == 1 && n[0] >= 0 && n[0] < static_cast<float>(count) && n[0] == std::floor(n[0])) {
     return {named_camera(data, static_cast<std::size_t>(n[0])), CameraSource::kScene};
   }
   if (n.size() == 6 || n.size() == 7) {

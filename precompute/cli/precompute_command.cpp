@@ -220,6 +220,7 @@ TransferData build(const PrecomputeOptions& chosen, const CommonOptions& options
                    BuildReport& report) {
   const BuildSettings settings = settings_of(chosen);
   check_can_write(chosen.output);
+  if (chosen.reader == "web") check_can_write(form_factor_file_beside(chosen.output));
   ProgressBar bar(!options.quiet);
   return build_transfer_data(
       chosen.scene, settings, report,

@@ -87,11 +87,23 @@ void write(const ViewFactorOptions& chosen, const std::string& format, const Vie
   if (format == "u-dales") write_u_dales(chosen.output, chosen.case_number, factors);
 }
 
+/// Throws Error if a file that will be written cannot be. Makes the folder of u-DALES.
+void check_outputs(const ViewFactorOptions& chosen, const std::string& format) {
+  std::filesystem::path output(chosen.output);
+  if (format == "u-dales") {
+    std::error_code error;
+    std::filesystem::create_directories(output, error);
+    output /= "svf.inp." + chosen.case_number;
+  }
+  check_can_write(output);
+  if (format == "mtx") check_can_write(sky_file_beside(output));
+}
+
 void run(const ViewFactorOptions& chosen, const CommonOptions& options) {
   const auto begin = std::chrono::steady_clock::now();
   const std::string format = format_of(chosen);
-  if (format != "u-dales") check_can_write(chosen.output);
   if (chosen.exchange && format != "npz") throw Error("--exchange needs --format npz");
+  check_outputs(chosen, format);
   const Facets facets = read_facets(chosen.geometry);
   const std::vector<double> emissivity =
       chosen.exchange ? emissivities(chosen, facets) : std::vector<double>();

@@ -5,13 +5,12 @@
 #include <bit>
 #include <charconv>
 #include <cstring>
-#include <fstream>
 #include <optional>
-#include <sstream>
 #include <string>
 #include <string_view>
 
 #include "precompute/import/file_extension.h"
+#include "precompute/import/text_file.h"
 #include "rebounce/error.h"
 
 namespace rebounce {
@@ -20,14 +19,6 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "binary STL is little-endian");
 
 constexpr std::size_t kStlHeader = 84, kStlTriangle = 50, kStlNormal = 12;
-
-std::string read_text(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw Error("cannot read " + path.string() + "; check its name");
-  std::ostringstream text;
-  text << file.rdbuf();
-  return std::move(text).str();
-}
 
 /// The words of a text file, line by line.
 class TextLines {
@@ -204,7 +195,7 @@ Facets read_facets(const std::filesystem::path& path) {
   if (kind != ".stl" && kind != ".obj" && kind != ".vs3") {
     throw Error(path.string() + ": not a file of facets; give an .stl, .obj or .vs3 file");
   }
-  const std::string text = read_text(path);
+  const std::string text = read_text_file(path);
   const TextLines lines(path, text);
   Facets facets;
   if (kind == ".stl") {

@@ -81,13 +81,15 @@ void write_npz(const std::filesystem::path& path, const ViewFactors& factors,
   write_npz(path, arrays);
 }
 
+std::filesystem::path sky_file_beside(const std::filesystem::path& path) {
+  return std::filesystem::path(path).replace_extension(".sky.mtx");
+}
+
 void write_matrix_market(const std::filesystem::path& path, const ViewFactors& factors) {
-  FacetText matrix(path);
+  FacetText matrix(path), sky(sky_file_beside(path));
   matrix.add("%%MatrixMarket matrix coordinate real general\n{0} {0} {1}\n", factors.size(),
              factors.factor.size());
   add_triplets(factors, matrix);
-  std::filesystem::path beside = path;
-  FacetText sky(beside.replace_extension(".sky.mtx"));
   sky.add("%%MatrixMarket matrix array real general\n{} 1\n", factors.size());
   for (const double part : factors.sky) sky.add("{:.9g}\n", part);
   matrix.commit();

@@ -15,8 +15,10 @@ namespace rebounce {
 void write_npz(const std::filesystem::path& path, const ViewFactors& factors,
                const ExchangeFactors* exchange = nullptr);
 
-/// The factors as a MatrixMarket file, and beside it, with ".sky.mtx" for the extension, the sky
-/// as one column.
+/// The file of the sky that belongs to a MatrixMarket file: ".sky.mtx" for the extension.
+std::filesystem::path sky_file_beside(const std::filesystem::path& path);
+
+/// The factors as a MatrixMarket file, and in sky_file_beside(path) the sky as one column.
 void write_matrix_market(const std::filesystem::path& path, const ViewFactors& factors);
 
 /// Files of u-DALES in `folder`, which is made if it is missing: vfsparse.inp.NNN with a line

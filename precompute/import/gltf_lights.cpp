@@ -61,9 +61,11 @@ std::optional<Light> place_light(const tinygltf::Light& source, const tinygltf::
   if (direction) light.direction = to_float3(*direction);
   const bool dark = std::any_of(light.color.begin(), light.color.end(),
                                 [](float channel) { return channel < 0; });
+  Float3 strongest = light.color;
+  for (float& channel : strongest) channel *= light.intensity;
   if (dark || !(light.intensity >= 0) || !std::isfinite(light.intensity) ||
-      !is_finite(light.color)) {
-    problem = "its colour or intensity is negative or not finite";
+      !is_finite(light.color) || !is_finite(strongest)) {
+    problem = "its colour times its intensity is negative or not finite";
   } else if (!is_finite(light.position) || !std::isfinite(light.range)) {
     problem = "its position or range is not finite";
   } else if (!direction && *type != LightType::kPoint) {

@@ -51,8 +51,10 @@ bool has_scheme(const std::string& uri) {
 }
 
 bool leaves(const std::filesystem::path& folder, const std::filesystem::path& file) {
-  const auto relative = std::filesystem::weakly_canonical(file).lexically_relative(
-      std::filesystem::weakly_canonical(folder));
+  std::error_code error;
+  const auto real_file = std::filesystem::weakly_canonical(file, error);
+  if (error) throw Error("the system cannot look for it: " + error.message());
+  const auto relative = real_file.lexically_relative(std::filesystem::weakly_canonical(folder));
   return relative.empty() || *relative.begin() == "..";
 }
 

@@ -4,12 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <glm/geometric.hpp>
-#include <iterator>
 #include <limits>
 
 #include "precompute/import/parsed_json.h"
+#include "precompute/import/text_file.h"
 #include "rebounce/error.h"
 #include "runtime/rays/float3_glm.h"
 
@@ -99,10 +98,7 @@ Float3 Field::unit_vector(const std::string& name, const Float3& fallback) const
 }
 
 json read_json_object(const std::filesystem::path& path, const std::string& content) {
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw Error("cannot open " + path.string() + "; check the name");
-  const std::string text{std::istreambuf_iterator<char>(stream), {}};
-  json document = parse_json_text(text, path.string());
+  json document = parse_json_text(read_text_file(path), path.string());
   if (!document.is_object()) {
     throw Error(path.string() + ": must hold an object with \"" + content + "\"");
   }

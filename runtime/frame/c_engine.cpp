@@ -22,10 +22,12 @@ static_assert(kLightSize1 == 84 && kSettingsSize1 == 16);
 
 constexpr const char* kLightInit = "rebounce_light_init";
 
+// Points, samples and lights that an engine is asked for.
+constexpr std::uint32_t kMostAsked = 1U << 20U;
+
 Engine make_engine(const rebounce_transfer& transfer, const rebounce_engine_settings& settings) {
   const auto number = [](std::uint32_t given) {
-    constexpr std::uint32_t kMost = 1U << 20U;
-    return static_cast<int>(std::min(given, kMost));
+    return static_cast<int>(std::min(given, kMostAsked));
   };
   return Engine(transfer.data,
                 {.direct_lighting = {.points_per_patch = number(settings.points_per_patch),
@@ -113,7 +115,7 @@ rebounce_status rebounce_engine_create(rebounce_transfer* transfer,
     if (settings != nullptr)
       chosen = take(settings, chosen, kSettingsSize1, "rebounce_engine_settings_init");
     auto handle = std::make_unique<rebounce_engine>(make_engine(*transfer, chosen));
-    handle->lights.reserve(chosen.light_capacity);
+    handle->lights.reserve(std::min(chosen.light_capacity, kMostAsked));
     *engine = handle.release();
     return REBOUNCE_OK;
   });

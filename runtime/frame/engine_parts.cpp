@@ -119,12 +119,20 @@ void Engine::set_emission_scale(std::uint32_t material, const Float3& scale) {
                 std::to_string(scene.materials.size()));
   }
   if (!is_light(scale)) throw Error("a scale of emission must be finite and at least 0");
-  for (std::size_t i = 0; i < parts_->emitted_exitance.size(); ++i) {
-    if ((*parts_->emitting_material)[i] != material) continue;
-    for (int c = 0; c < kChannelCount; ++c) {
-      parts_->emitted_exitance[i][c] = scale[c] * scene.patches.emitted_exitance[i][c];
+  const auto scaled = [&](std::size_t i) {
+    Float3 exitance = scene.patches.emitted_exitance[i];
+    for (int c = 0; c < kChannelCount; ++c) exitance[c] *= scale[c];
+    return exitance;
+  };
+  const auto for_each = [&](const auto& visit) {
+    for (std::size_t i = 0; i < parts_->emitted_exitance.size(); ++i) {
+      if ((*parts_->emitting_material)[i] == material) visit(i);
     }
-  }
+  };
+  for_each([&](std::size_t i) {
+    if (!is_light(scaled(i))) throw Error("a scale of emission makes light that is not finite");
+  });
+  for_each([&](std::size_t i) { parts_->emitted_exitance[i] = scaled(i); });
 }
 
 std::span<const Float3> Engine::direct_irradiance() const {

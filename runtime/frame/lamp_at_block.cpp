@@ -156,7 +156,9 @@ class LampAtBlock {
         sum[e] += free * (arriving > 0 ? arriving : 0.0F);
       }
     }
-    std::copy_n(sum.begin(), slots_end(part) - part * kPart, &irradiance_[part * kPart]);
+    for (std::size_t slot = part * kPart; slot < slots_end(part); ++slot) {
+      irradiance_[slot] += sum[slot - part * kPart];
+    }
   }
 
   /// The same, by rays where volumes do not tell.

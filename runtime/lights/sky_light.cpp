@@ -51,6 +51,10 @@ void check_sky(const Sky& sky, const TransferData& data) {
       (sky.distribution && std::ranges::any_of(*sky.distribution, is_bad))) {
     throw Error("the sky's color, luminance and distribution must be finite and at least 0");
   }
+  const float most = sky.distribution ? std::ranges::max(*sky.distribution) : 1;
+  if (std::ranges::any_of(scaled(sky, std::numbers::pi_v<float> * most), is_bad)) {
+    throw Error("the sky's luminance times its color and its distribution must be finite");
+  }
   if (sky.distribution && data.sky_cells.empty()) {
     throw Error(
         "the transfer file does not say in which directions patches see the sky; precompute the "

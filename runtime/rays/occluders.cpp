@@ -257,6 +257,7 @@ class Planes {
   bool add_pieces(const Plane& plane, std::vector<Occluder>& occluders) const {
     const bool solid = mesh_.opacity.of_triangle(plane.triangle[0]).empty();
     const std::vector<Side> sides = outline(plane);
+    if (sides.empty()) return true;  // slivers that undo each other have no area
     ConvexPieces pieces(sides, tolerance_);
     for (const Outline& piece : pieces.take()) {
       // Fans of pieces with four corners, if there are more.
@@ -298,7 +299,9 @@ void sort_by_place(std::vector<Occluder>& occluders) {
   for (const Occluder& occluder : occluders) box.add(middle(occluder));
   const glm::vec3 scale = 1023.0F / glm::max(box.extent(), glm::vec3(1e-20F));
   const auto key = [&](const Occluder& occluder) {
-    const glm::uvec3 cell(scale * (middle(occluder) - box.low));
+    // Extents may be infinite; what is then no number becomes 0.
+    const glm::vec3 at = scale * (middle(occluder) - box.low);
+    const glm::uvec3 cell(glm::max(glm::vec3(0), glm::min(at, glm::vec3(1023))));
     return spread_bits(cell.x) | spread_bits(cell.y) << 1 | spread_bits(cell.z) << 2;
   };
   std::ranges::stable_sort(occluders, {}, key);

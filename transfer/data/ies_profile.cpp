@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include "rebounce/error.h"
@@ -122,7 +123,11 @@ class IesReader {
     if (low < -kAngleTolerance || high > 180 + kAngleTolerance) {
       refuse("has vertical angles outside of 0 to 180 degrees");
     }
-    profile.vertical.front() = std::max(0.0F, low);
+    for (float& angle : profile.vertical) angle = std::clamp(angle, 0.0F, 180.0F);
+    if (std::ranges::adjacent_find(profile.vertical, std::greater_equal<>()) !=
+        profile.vertical.end()) {
+      refuse("has a vertical angle out of order");
+    }
     const float last = profile.horizontal.back();
     if (!near(profile.horizontal.front(), 0)) {
       refuse("has horizontal angles that do not begin with 0 degrees");

@@ -46,12 +46,17 @@ std::string advice(int error) {
               advice(error));
 }
 
-/// Follows a symbolic link `target`, so that the rename replaces the file and not the link.
+/// Follows a symbolic link `target`, so that the rename replaces the file and not the link. The
+/// file need not exist.
 fs::path resolve(const fs::path& target) {
+  constexpr int kMostLinks = 40;  // as Linux follows
   std::error_code error;
-  if (!fs::is_symlink(target, error)) return target;
-  fs::path resolved = fs::weakly_canonical(target, error);
-  if (error) fail(target, error.value());
+  fs::path resolved = target;
+  for (int k = 0; fs::is_symlink(resolved, error); ++k) {
+    const fs::path next = fs::read_symlink(resolved, error);
+    if (error || k == kMostLinks) fail(target, error ? error.value() : ELOOP);
+    resolved = resolved.parent_path() / next;  // `next` itself if it is absolute
+  }
   return resolved;
 }
 

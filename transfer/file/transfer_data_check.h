@@ -7,7 +7,7 @@
 namespace rebounce {
 
 /// Checks everything but the values of the operator: sizes agree, indices are in range, numbers are
-/// finite and in the ranges that transfer_data.h states. Throws Error that names `file` and the
+/// finite and in the ranges that scene_data.h states. Throws Error that names `file` and the
 /// first wrong tensor.
 void check_transfer_data(const TransferData& data, const std::string& file);
 

@@ -258,7 +258,11 @@ std::shared_ptr<const DenseOperator> read_dense_operator(const SafetensorsFile& 
   storage.matrix_count = static_cast<std::uint32_t>(tiles.shape[0]);
   storage.channel_matrix =
       read_channel_matrix(file, tensor::kDenseChannelMatrix, storage.matrix_count);
-  return std::make_shared<const DenseOperator>(std::move(storage));
+  try {
+    return std::make_shared<const DenseOperator>(std::move(storage));
+  } catch (const Error& error) {
+    refuse(file, error.what());
+  }
 }
 
 std::vector<TransferBlock> read_blocks(const SafetensorsFile& file, const char* name) {

@@ -194,7 +194,8 @@ struct BuildSettings {
   /// is a source, named or not. The operator is then hierarchical.
   std::vector<std::string> receivers, sources;
   /// Refuses to start what needs more, bytes; 0: half of the machine's memory. With links, a lower
-  /// limit means that less of the operator is made at a time: slower, with the same bits.
+  /// limit means that links are not made finer where finer ones would not fit, and that less of the
+  /// operator is made at a time: slower, with the same bits from the same links.
   std::uint64_t memory_limit_bytes = 0;
   /// With kLinks: folder that the links, and what is done of the operator, are kept in, so that a
   /// build that was killed has that done when it is started again with the same scene and settings.

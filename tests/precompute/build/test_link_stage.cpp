@@ -10,6 +10,7 @@
 #include "precompute/build/exchange_stage.h"
 #include "precompute/lights/random_lights.h"
 #include "precompute/lights/reference_solution.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/test_scenes.h"
 #include "transfer/base/area_norm.h"
@@ -161,6 +162,31 @@ TEST(LinkStage, FindsLinksAnewForOtherSettingsAndWhereTheCheckpointIsDamaged) {
   const Found anew(settings, false);
   EXPECT_EQ(anew.phases("form factors"), 1);
   expect_same(anew, first);
+}
+
+TEST(LinkStage, KeepsLinksUnlessTheMemoryLimitMeansOthers) {
+  const test::TemporaryFolder folder;
+  BuildSettings settings = from_links(kCoarseLinks);
+  settings.checkpoint = folder.path();
+  settings.memory_limit_bytes = 1;
+  const Found stopped(settings);
+  settings.memory_limit_bytes = 2;
+  EXPECT_TRUE(Found(settings).report.seconds.empty()) << "finer ones do not fit either";
+  settings.memory_limit_bytes = std::uint64_t{1} << 40U;
+  const Found finer(settings);
+  EXPECT_EQ(finer.phases("form factors"), 1);
+  EXPECT_GE(finer.phases("finer links"), 1);
+  settings.memory_limit_bytes = std::uint64_t{1} << 50U;
+  EXPECT_TRUE(Found(settings).report.seconds.empty()) << "they need no more";
+}
+
+TEST(LinkStage, RefusesACheckpointOfPairs) {
+  const test::TemporaryFolder folder;
+  BuildSettings settings;
+  settings.exchange_source = ExchangeSource::kPairs;
+  settings.checkpoint = folder / "parts";
+  test::expect_error([&] { Found found(settings); }, "--checkpoint");
+  EXPECT_FALSE(std::filesystem::exists(folder / "parts"));
 }
 
 TEST(LinkStage, GivesPatchesAndMeshBack) {

@@ -114,6 +114,7 @@ TEST(BlockCheckpoint, SaysWhereItCannotKeep) {
   const test::TemporaryFolder folder;
   test::write_bytes(folder / "file", "no folder");
   test::expect_error([&] { BlockCheckpoint(folder / "file", "key"); }, "checkpoints");
+  test::expect_error([] { BlockCheckpoint("/proc/self", "key"); }, "cannot write /proc/self");
   const BlockCheckpoint checkpoint(folder.path(), "key");
   std::filesystem::create_directory(folder / kName);
   EXPECT_FALSE(checkpoint.find(kName));

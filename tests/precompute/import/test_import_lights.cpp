@@ -62,11 +62,12 @@ TEST_F(ImportLights, LightsThatCannotBeUsedAreLeftOutWithAWarning) {
       {{"type", "point"}, {"intensity", -1}},
       {{"type", "area"}},
       {{"type", "directional"}},
-      {{"type", "point"}, {"color", {1, -1, 1}}}};
-  for (int i = 0; i < 4; ++i) triangle_.add_node(light_node(i, {{"scale", {0, 0, 0}}}));
+      {{"type", "point"}, {"color", {1, -1, 1}}},
+      {{"type", "point"}, {"color", {1e30, 1, 1}}, {"intensity", 1e30}}};
+  for (int i = 0; i < 5; ++i) triangle_.add_node(light_node(i, {{"scale", {0, 0, 0}}}));
   const Scene scene = import(triangle_);
   EXPECT_TRUE(scene.lights.empty());
-  EXPECT_EQ(scene.warnings.size(), 4U);
+  EXPECT_EQ(scene.warnings.size(), 5U);
 }
 
 TEST_F(ImportLights, CamerasLookAlongTheirNodes) {

@@ -166,6 +166,9 @@ TEST(Engine, EmittersAreScaledByMaterial) {
   EXPECT_EQ(full, copy(engine.radiosity()));
   EXPECT_THROW(engine.set_emission_scale(3, {1, 1, 1}), Error);
   EXPECT_THROW(engine.set_emission_scale(1, {1, -1, 1}), Error);
+  test::expect_error([&] { engine.set_emission_scale(2, {3e38F, 1, 1}); }, "not finite");
+  engine.relight({}, {});
+  EXPECT_EQ(full, copy(engine.radiosity())) << "nothing is scaled";
 }
 
 TEST(Engine, NeedsAnOperator) {

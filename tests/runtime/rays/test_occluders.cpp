@@ -84,6 +84,22 @@ TEST(Occluders, RoundSurfacesOfManySidesAreLeftToRays) {
   EXPECT_LE(area(part), 1.0001 * area(large));
 }
 
+TEST(Occluders, SliversThatUndoEachOtherAreLeftOut) {
+  SCOPED_TRACE(kSeed);
+  std::mt19937 engine(kSeed);
+  std::uniform_real_distribution<float> uniform(0.5F, 1);
+  const Float3 grey{0.5F, 0.5F, 0.5F};
+  for (int k = 0; k < 100; ++k) {
+    // The sign of their area is rounding.
+    const glm::vec3 a(0), c(uniform(engine), uniform(engine), 0);
+    const glm::vec3 b = std::ldexp(1.0F, -40) * glm::vec3(std::nextafter(c.x, 2.0F), c.y, 0);
+    TransferData data;
+    test::add_patch(data, a, b, c, grey);
+    test::add_patch(data, c, b, a, grey);
+    EXPECT_LT(area(find_occluders(data.mesh, kAll, kAll)), 1e-12);
+  }
+}
+
 TEST(Occluders, StopTheSameRaysAsTheTriangles) {
   SCOPED_TRACE(kSeed);
   std::mt19937 engine(kSeed);

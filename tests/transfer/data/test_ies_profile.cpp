@@ -70,6 +70,7 @@ TEST(IesProfile, WhatIsNoProfileIsRefused) {
   refuse(kRound, "1000 2 3 1", "1000 2 1e9 1", "from 1 to");
   refuse(kRound, "1000 2 3 1", "1000 2 2.5 1", "from 1 to");
   refuse(kRound, "0 45 90", "0 90 45", "out of order");
+  refuse(kRound, "0 45 90", "-0.009 -0.005 90", "out of order");
   refuse(kRound, "0 45 90", "0 45 200", "outside");
   refuse(kRound, "100 50 0", "100 50", "candela value");
   refuse(kRound, "100 50 0", "100 nan 0", "candela value");
