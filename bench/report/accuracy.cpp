@@ -16,8 +16,12 @@
 namespace rebounce::bench {
 namespace {
 
-/// An iteration that is this near to its own solution has converged for the report.
-constexpr double kConverged = 3e-5;
+/// An iteration that is this near to its own solution has converged for the report, and so has one
+/// whose own solution is off by many times what is left.
+constexpr double kConverged = 3e-5, kLeftOfError = 0.05;
+
+/// Iterations are looked at after each sweep, up to so many.
+constexpr int kMostSweeps = 100;
 
 /// More than the caches of most processors hold.
 constexpr std::size_t kCacheBytes = std::size_t{96} << 20;
@@ -122,9 +126,9 @@ class AccuracyBench {
         }
         continue;
       }
-      for (const int sweeps : settings_.sweeps) {
+      for (int sweeps = 1; sweeps <= kMostSweeps; ++sweeps) {
         rows.push_back(row(contestant, first, sweeps, *method, cuts));
-        if (rows.back().iteration_error < kConverged) break;
+        if (has_converged(rows.back())) break;
       }
     }
     return rows;
@@ -163,6 +167,10 @@ class AccuracyBench {
           settings_.lamp_count;
     }
     return result;
+  }
+
+  static bool has_converged(const AccuracyRow& row) {
+    return row.iteration_error < std::max(kConverged, kLeftOfError * row.error);
   }
 
   static Start start_of(const AccuracyRow& row) { return {row.contestant, row.cold}; }

@@ -22,8 +22,8 @@ struct AccuracyRow {
   Timing cold_time{};          ///< after something else has used the caches
 };
 
-/// Errors and times of every contestant after every change: for iterations after each of
-/// settings.sweeps until they have converged. All times are interleaved; those of iterations are of
+/// Errors and times of every contestant after every change: for iterations after each
+/// sweep until they have converged. All times are interleaved; those of iterations are of
 /// a line through the times of a few numbers of sweeps. Throws Cancelled if asked to stop.
 std::vector<AccuracyRow> measure_accuracy(const Contenders& contenders,
                                           const std::vector<Contestant>& contestants,

@@ -8,7 +8,6 @@ void ReportSettings::make_quick() {
   ranks = {64};
   lamp_count = 5;
   motions = {0.001, 0.01, 0.05};
-  sweeps = {1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 16, 24, 48};
   repeats = 3;
   frame_count = 60;
   patch_comparison = {.patch_count = 500, .points_per_patch = 32, .samples_per_point = 16};
@@ -21,7 +20,6 @@ void ReportSettings::make_quick() {
 void ReportSettings::make_large() {
   ranks = {256};
   motions = {0.001, 0.01, 0.05};
-  sweeps = {1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 16, 24};
   repeats = 5;
   frame_count = 120;
 }
@@ -31,7 +29,6 @@ void ReportSettings::make_huge() {
   refined_tolerances = {kDefaultTolerance};
   lamp_count = 16;
   motions = {0.01};
-  sweeps = {1, 2, 3, 4, 6, 8, 10, 12, 16};
   repeats = 3;
   frame_count = 60;
   truth = false;

@@ -25,8 +25,6 @@ struct ReportSettings {
   int lamp_count = 20;  ///< over which errors are averaged; of all kinds of kLampTypes in turns
   /// Parts of the scene's diagonal by which a lamp is moved, each in (0, 0.2].
   std::vector<double> motions = {0.0003, 0.001, 0.003, 0.01, 0.05, 0.2};
-  /// Sweeps after which an iteration is looked at, ascending.
-  std::vector<int> sweeps = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 20, 24, 32, 48};
   int repeats = 7;        ///< timings of each thing
   int solve_threads = 1;  ///< OpenMP threads while relighting is timed; building has all
 

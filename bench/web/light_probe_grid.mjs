@@ -75,6 +75,7 @@ function add(name, frames, values) {
 
 await page.evaluate((given) => window.bench.start(given), lights);
 await page.screenshot({ path: join(out, 'rebounce.png') });
+// One frame by construction, as `update` is complete; the light is that of the program.
 add('Rebounce', 1, points.map(({ shown }) => shown));
 for (const [grid, bounces] of [[[10, 7, 7], 1], [[10, 7, 7], 2], [[20, 7, 10], 2]]) {
   const { frames, values } = await page.evaluate(

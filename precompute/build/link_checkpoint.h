@@ -24,8 +24,8 @@ struct JudgedLinks {
   LinkLimits limits;
 };
 
-/// A hash of all that the links of find_links depend on except the memory limit, as its arguments are
-/// before.
+/// A hash of all that the links of find_links depend on except the memory limit, as its arguments
+/// are before.
 std::string identity_of_links(const PatchModel& model, const PatchRoles& roles, bool judged,
                               const BuildSettings& decided);
 

@@ -65,7 +65,8 @@ double finer_epsilon(double epsilon, double error, double tolerance) {
 /// The memory that as many links as epsilon times `step` gives need, where `builder` has made
 /// `link_count` and nothing else holds them.
 std::uint64_t bytes_of_finer(const PatchModel& model, const PatchRoles& roles,
-                             const BuildSettings& decided, const LinkBuilder& builder, std::size_t link_count, double step) {
+                             const BuildSettings& decided, const LinkBuilder& builder,
+                             std::size_t link_count, double step) {
   const double finer = static_cast<double>(link_count) * std::pow(step, -kCountPower);
   LinkedBuild build =
       linked_build(built_scene(model.patches.size(), model.mesh), link_count,

@@ -100,7 +100,7 @@ void run(const RenderOptions& chosen, const CommonOptions& options) {
   light.reflected_exitance = reflected;
   light.error = error;
   const PictureRenderer renderer(*data, *engine.parts().tracer);
-  if (!settings.exposure && is_light(settings.show)) {
+  if (!settings.exposure && shows_light(settings.show)) {
     settings.exposure = exposure_for(renderer, light, settings.camera, settings.show);
   }
   const Picture picture = renderer.render(light, settings);

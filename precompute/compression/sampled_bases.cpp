@@ -261,7 +261,7 @@ void append(Samples& light, const Samples& more) {
   }
 }
 
-/// The smallest ranks with a mean square error of at most `allowed`, as judges tell it.
+/// The smallest ranks with a mean square error of about `allowed`, as judges tell it.
 std::vector<Index> find_ranks(const BasisSampler& sampler, std::span<const Directions> cells,
                               const Samples& judges, double allowed) {
   // The weights of the cells are known, and what their missing energy means for light follows from

@@ -20,6 +20,15 @@ static_assert(kMostTrainingLights ==
               kTrainingPointCount + kTrainingSpotCount + kTrainingSunCount + 1);
 static_assert(kMostValidationLights == kValidationPointCount + 1);
 
+// After those of the three kinds of training lights.
+constexpr int kValidationDraw = 3;
+
+/// The seed of the lights that are drawn as number `draw`.
+std::uint64_t seed_of_draw(std::uint64_t seed, int draw) {
+  for (int k = 0; k <= draw; ++k) seed = mix_bits(seed);
+  return seed;
+}
+
 /// What patches send of the light of the scene's own lamps and emitters, [n] lx.
 std::vector<Float3> own_exitance(const TransferData& data, const RayTracer& tracer) {
   const PatchTable& patches = data.patches;
@@ -32,24 +41,29 @@ std::vector<Float3> own_exitance(const TransferData& data, const RayTracer& trac
 
 }  // namespace
 
-DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& tracer,
-                                std::uint64_t seed, const PatchRoles& roles) {
-  const auto draw = [&](LightKind kind, int count) {
-    seed = mix_bits(seed);
-    return random_initial_exitances(data, tracer, kind, count, seed, roles);
-  };
-  DrawnLights lights;
+std::vector<std::vector<Float3>> draw_training_lights(const TransferData& data,
+                                                      const RayTracer& tracer, std::uint64_t seed,
+                                                      const PatchRoles& roles) {
+  std::vector<std::vector<Float3>> lights;
+  int draw = 0;
   for (const auto& [kind, count] : {std::pair(LightKind::kPoint, kTrainingPointCount),
                                     std::pair(LightKind::kSpot, kTrainingSpotCount),
                                     std::pair(LightKind::kSky, kTrainingSunCount)}) {
-    std::ranges::move(draw(kind, count), std::back_inserter(lights.training));
+    std::ranges::move(
+        random_initial_exitances(data, tracer, kind, count, seed_of_draw(seed, draw++), roles),
+        std::back_inserter(lights));
   }
   // The lamps of the scene itself are certain to be used.
-  std::vector<Float3> own = own_exitance(data, tracer);
-  roles.keep(PatchRoles::kSource, own);
-  lights.training.push_back(own);
-  lights.validation.push_back(std::move(own));
-  std::ranges::move(draw(LightKind::kPoint, kValidationPointCount),
+  roles.keep(PatchRoles::kSource, lights.emplace_back(own_exitance(data, tracer)));
+  return lights;
+}
+
+DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& tracer,
+                                std::uint64_t seed, const PatchRoles& roles) {
+  DrawnLights lights{draw_training_lights(data, tracer, seed, roles), {}};
+  lights.validation.push_back(lights.training.back());
+  std::ranges::move(random_initial_exitances(data, tracer, LightKind::kPoint, kValidationPointCount,
+                                             seed_of_draw(seed, kValidationDraw), roles),
                     std::back_inserter(lights.validation));
   return lights;
 }

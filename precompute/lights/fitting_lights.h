@@ -37,11 +37,15 @@ inline constexpr std::size_t kFittingLightBytes =
     3 * sizeof(Float3) * (kMostTrainingLights + kMostValidationLights) +
     sizeof(double) * kMostTrainingLights;
 
-/// Draws the lights that the operator of a scene is fitted to. Training lights are point lights,
-/// spot lights and, in an open scene, suns; validation lights are other point lights. Both contain
-/// the light of the scene's own lamps and emitters together, last among the training lights and
-/// first among the validation lights. All are cut to what sources emit. The same `seed` gives the
-/// same lights.
+/// Draws the training lights of a scene: point lights, spot lights, in an open scene suns, and last
+/// the light of the scene's own lamps and emitters together. All are cut to what sources emit. The
+/// same `seed` gives the same lights.
+std::vector<std::vector<Float3>> draw_training_lights(const TransferData& data,
+                                                      const RayTracer& tracer, std::uint64_t seed,
+                                                      const PatchRoles& roles = {});
+
+/// Draws the same and validation lights, which are first the last of them, and then other point
+/// lights.
 DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& tracer,
                                 std::uint64_t seed, const PatchRoles& roles = {});
 

@@ -22,7 +22,8 @@ SampledError error_of_links(const TransferData& data, std::span<const std::uint3
                             const RayTracer& tracer, const PatchRoles& roles, std::uint64_t seed,
                             const Progress& progress) {
   const ReferenceSolver solver(data.links, data.patches);
-  WholeErrorEstimator estimator(data, roles, seed,
+  // Other rays than those of the statement that is made of the operator, which chance would favour.
+  WholeErrorEstimator estimator(data, roles, mix_bits(seed),
                                 WholeErrorEstimator::sample_for(data.patches.size(), kJudgingRays));
   const std::vector<std::vector<Float3>> lights = random_initial_exitances(
       data, tracer, LightKind::kPoint, kJudgingLights, mix_bits(seed + kJudgingLights), roles);

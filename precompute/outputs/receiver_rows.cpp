@@ -43,13 +43,13 @@ struct Lights {
 
 Lights light_scene(const TransferData& data, const RayTracer& tracer, std::uint64_t seed) {
   const PatchTable& patches = data.patches;
-  const DrawnLights drawn = draw_fitting_lights(data, tracer, seed, data.transfer->roles());
+  const auto drawn = draw_training_lights(data, tracer, seed, data.transfer->roles());
   const double whole = std::accumulate(patches.area.begin(), patches.area.end(), 0.0);
-  const std::size_t count = std::min(kLights, drawn.training.size());
+  const std::size_t count = std::min(kLights, drawn.size());
   std::vector<std::vector<Float3>> exitance, arriving;
   std::vector<float> workspace(data.transfer->workspace_size());
   for (std::size_t k = 0; k < count; ++k) {
-    const std::vector<Float3>& light = drawn.training[k * drawn.training.size() / count];
+    const std::vector<Float3>& light = drawn[k * drawn.size() / count];
     std::vector<Float3> arrives(patches.size());
     data.transfer->apply(light, arrives, workspace);
     if (arrives_nowhere(arrives, light, patches.area)) continue;

@@ -229,14 +229,13 @@ TEST_F(QuickReport, MoreSweepsErrLessUntilTheyHaveConverged) {
       continue;
     }
     EXPECT_GT(iteration_error, 3e-5) << "has converged before";
+    EXPECT_EQ(row.at("sweeps"), sweeps.size() + 1) << "each number of sweeps is looked at";
     iteration_error = row.at("iteration_error");
     sweeps.push_back(row.at("sweeps"));
     errors.push_back(row.at("error"));
   }
   ASSERT_GE(sweeps.size(), 8U);
-  const std::vector<int> wanted = quick_settings().sweeps;
-  EXPECT_TRUE(std::equal(sweeps.begin(), sweeps.end(), wanted.begin()));
-  EXPECT_TRUE(sweeps.size() == wanted.size() || iteration_error <= 3e-5);
+  EXPECT_TRUE(iteration_error <= 3e-5 || iteration_error <= 0.05 * errors.back());
   EXPECT_LT(errors[3], 0.3 * errors[0]);
   EXPECT_LT(errors[7], 0.3 * errors[3]);
 }

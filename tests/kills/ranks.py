@@ -35,9 +35,18 @@ def begin(count, program, folder):
                             stderr=subprocess.PIPE)
 
 
+def errors_of(process):
+    """What it has printed as errors at its end; ends it if it hangs."""
+    try:
+        return process.communicate(timeout=300)[1].decode()
+    except subprocess.TimeoutExpired:
+        process.terminate()  # mpirun ends its ranks
+        raise
+
+
 def run(count, program, folder):
     process = begin(count, program, folder)
-    text = process.communicate(timeout=300)[1].decode()
+    text = errors_of(process)
     kills.require(process.returncode == 0, f"{count} ranks: {text}")
 
 
@@ -93,7 +102,7 @@ def kill_and_go_on(program, folder, known, draw, most, moment):
     process = begin(count, program, folder)
     # Of what one process uses, each rank uses a part.
     killed = kill_rank(process, rank, moment / count)
-    process.communicate(timeout=300)
+    errors_of(process)
     kills.require(process.returncode != 0 or not killed, f"rank {rank} of {count}: exit status 0")
     kills.check_after_kill(COMMAND, folder, {name: kills.OLDER for name in COMMAND.outputs},
                            known.files)

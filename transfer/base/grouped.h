@@ -30,6 +30,11 @@ class Grouped {
     return {number_.data() + begin_[group], number_.data() + begin_[group + 1]};
   }
 
+  /// The numbers of a group, to be put into another order.
+  std::span<std::uint32_t> operator[](std::size_t group) {
+    return {number_.data() + begin_[group], number_.data() + begin_[group + 1]};
+  }
+
   /// [groups + 1] index of each group's first number; the last entry is size()
   const std::vector<Index>& offsets() const { return begin_; }
 

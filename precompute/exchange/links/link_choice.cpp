@@ -54,7 +54,7 @@ class BlockFitting {
 
   /// The links between two nodes; the first node comes before the second.
   std::vector<AffineLink> fit(const NodePair& block) {
-    sums_.add_up(tree_.range(block.a), tree_.range(block.b));
+    if (!sums_.add_up(tree_.range(block.a), tree_.range(block.b))) return {};
     a_.list(tree_.tree, block.a);
     b_.list(tree_.tree, block.b);
     choice_.assign(a_.size() * b_.size(), {});

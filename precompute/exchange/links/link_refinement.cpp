@@ -254,19 +254,9 @@ bool LinkRefinement::needs_all_rays(const Candidate& pair) const {
   return pair.view == View::kMixed || is_doubtful(pair.a) || is_doubtful(pair.b);
 }
 
-/// The mean over both nodes of the squared weight of errors.
-double LinkRefinement::weight_squared(const Candidate& pair) const {
-  const double a = tree_[pair.a].weight, b = tree_[pair.b].weight;
-  return 0.5 * (a * a + b * b);
-}
-
-double LinkRefinement::allowed_squared(const Candidate& pair) const {
-  return epsilon_ * epsilon_ / weight_squared(pair);
-}
-
 LinkRefinement::Outcome LinkRefinement::link_nodes(const Candidate& pair, Scratch& scratch) const {
   const PairKernel& kernel = scratch.kernel;
-  const double allowed = allowed_squared(pair);
+  const double allowed = allowed_squared();
   const double least =
       kernel.faces_in_part()
           ? std::max(kernel.residual_squared(), kernel.norm_squared() / (kNegligible * kNegligible))
@@ -305,7 +295,7 @@ LinkRefinement::Outcome LinkRefinement::link_mixed(const Candidate& pair, const 
                                visible.spread * kernel.norm_squared();
   // If some children see each other and others do not, a wall may be between them, and light would
   // leak through it.
-  if (visible.divided || !(error_squared < allowed_squared(pair))) {
+  if (visible.divided || !(error_squared < allowed_squared())) {
     return split(pair, View::kMixed);
   }
   return make_link(pair, kernel, visible, std::max(least_squared, error_squared));
@@ -315,17 +305,16 @@ LinkRefinement::Outcome LinkRefinement::link_mixed(const Candidate& pair, const 
 LinkRefinement::Outcome LinkRefinement::make_link(const Candidate& pair, const PairKernel& kernel,
                                                   const LinkRays::Visibility& visible,
                                                   double least_squared) const {
-  return {
-      .kind = Outcome::Kind::kLink,
-      .view = View::kUnknown,
-      .link = {.a = pair.a,
-               .b = pair.b,
-               .exchange_area = static_cast<float>(visible.part * kernel.unoccluded()),
-               .unoccluded_area = static_cast<float>(kernel.unoccluded()),
-               .gradient_a = stored_gradient(visible.part * kernel.gradient_a()),
-               .gradient_b = stored_gradient(visible.part * kernel.gradient_b()),
-               .least_epsilon = static_cast<float>(std::sqrt(least_squared * weight_squared(pair))),
-               .view = pair.view}};
+  return {.kind = Outcome::Kind::kLink,
+          .view = View::kUnknown,
+          .link = {.a = pair.a,
+                   .b = pair.b,
+                   .exchange_area = static_cast<float>(visible.part * kernel.unoccluded()),
+                   .unoccluded_area = static_cast<float>(kernel.unoccluded()),
+                   .gradient_a = stored_gradient(visible.part * kernel.gradient_a()),
+                   .gradient_b = stored_gradient(visible.part * kernel.gradient_b()),
+                   .least_epsilon = static_cast<float>(std::sqrt(least_squared)),
+                   .view = pair.view}};
 }
 
 /// Splits the node that looks larger from the other: the distance is the same for both.

@@ -119,8 +119,7 @@ class LinkRefinement {
   Outcome make_link(const Candidate& pair, const PairKernel& kernel,
                     const LinkRays::Visibility& visible, double least_squared) const;
   Outcome split(const Candidate& pair, View view) const;
-  double weight_squared(const Candidate& pair) const;
-  double allowed_squared(const Candidate& pair) const;
+  double allowed_squared() const { return epsilon_ * epsilon_; }
   void merge(std::span<const Candidate> generation, const std::vector<Outcome>& outcomes,
              std::vector<Link>& links, std::vector<Candidate>& next);
   void append_children(const Candidate& pair, const Outcome& outcome,

@@ -69,8 +69,7 @@ bool cannot_exchange(const LinkNode& a, const LinkNode& b) {
   return is_behind(a, b) || is_behind(b, a);
 }
 
-LinkTree::LinkTree(const PatchModel& model, const PatchGeometry& geometry,
-                   std::span<const float> weight) {
+LinkTree::LinkTree(const PatchModel& model, const PatchGeometry& geometry) {
   ClusterTree tree = build_cluster_tree(model.patches, 1, 1);
   patch_ = std::move(tree.patch);
   area_before_.resize(patch_.size() + 1);
@@ -83,7 +82,7 @@ LinkTree::LinkTree(const PatchModel& model, const PatchGeometry& geometry,
     nodes_[k].begin = tree.clusters[k].begin;
     nodes_[k].count = tree.clusters[k].count;
     nodes_[k].first_child = tree.clusters[k].first_child;
-    bound(nodes_[k], geometry, weight);
+    bound(nodes_[k], geometry);
   }
   cell_begin_ = {0};
   for (std::uint32_t k = 0; k < nodes_.size(); ++k) {
@@ -92,13 +91,9 @@ LinkTree::LinkTree(const PatchModel& model, const PatchGeometry& geometry,
   }
 }
 
-void LinkTree::bound(LinkNode& node, const PatchGeometry& geometry,
-                     std::span<const float> weight) const {
-  double weight_squared = 0;
+void LinkTree::bound(LinkNode& node, const PatchGeometry& geometry) const {
   for (const std::uint32_t patch : patches(node)) {
-    const double area = geometry.area(patch), w = weight.empty() ? 1 : weight[patch];
-    node.area += area;
-    weight_squared += area * w * w;
+    node.area += geometry.area(patch);
     for (const FlatTriangle& t : geometry.triangles(patch)) {
       node.center += t.stopping_area() * t.centroid;
       node.normal += t.stopping_area() * t.normal;
@@ -106,7 +101,6 @@ void LinkTree::bound(LinkNode& node, const PatchGeometry& geometry,
   }
   node.center /= node.area;
   node.normal /= node.area;
-  node.weight = std::sqrt(weight_squared / node.area);
   const double length = glm::length(node.normal);
   if (length > kNoAxis) node.axis = node.normal / length;
   for (const std::uint32_t patch : patches(node)) {

@@ -27,7 +27,6 @@ struct LinkNode {
   double cone_cosine = 1;  ///< least cosine between `axis` and a patch's normal
   double lowest = kInfinity,
          highest = -kInfinity;  ///< limits of dot(axis, x) over all patches
-  double weight = 1;            ///< root mean square of the patches' weights
   /// Maps the first moment of a quantity over the cells to its gradient: the pseudo-inverse of the
   /// second moment of the cells, 1/m⁴.
   glm::dmat3 inverse_moment{0};
@@ -44,8 +43,7 @@ class LinkTree {
   /// that grows with the square.
   static constexpr std::uint32_t kCellCount = 16;
 
-  /// `weight` [n] >= 0, or empty for 1 everywhere.
-  LinkTree(const PatchModel& model, const PatchGeometry& geometry, std::span<const float> weight);
+  LinkTree(const PatchModel& model, const PatchGeometry& geometry);
 
   std::span<const LinkNode> nodes() const { return nodes_; }
   const LinkNode& operator[](std::uint32_t node) const { return nodes_[node]; }
@@ -62,7 +60,7 @@ class LinkTree {
   std::uint32_t patch_at(const LinkNode& node, double fraction) const;
 
  private:
-  void bound(LinkNode& node, const PatchGeometry& geometry, std::span<const float> weight) const;
+  void bound(LinkNode& node, const PatchGeometry& geometry) const;
   void choose_cells(std::uint32_t node);
   void invert_moment(std::uint32_t node);
 

@@ -1,7 +1,9 @@
 #include "precompute/exchange/links/linked_matrix.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 namespace rebounce {
@@ -36,15 +38,19 @@ class LinkedMatrix::Filler {
       : matrix_(matrix),
         near_(members(near)),
         far_(members(far)),
-        far_before_(matrix.position_.size() + 1, 0),
         entries_(entries),
         near_stride_(near_stride),
         far_stride_(far_stride) {
-    for (const auto& m : far_) far_before_[m.position + 1] = 1;
+    if (far_.empty()) return;
+    far_begin_ = far_.front().position;
+    far_before_.assign(far_.back().position - far_begin_ + 2, 0);
+    for (const auto& m : far_) far_before_[m.position - far_begin_ + 1] = 1;
     for (std::size_t k = 1; k < far_before_.size(); ++k) far_before_[k] += far_before_[k - 1];
   }
 
-  void fill() { visit(0, near_); }
+  void fill() {
+    if (!far_.empty()) visit(0, near_);
+  }
 
  private:
   std::vector<Member> members(std::span<const std::uint32_t> patches) const {
@@ -60,15 +66,30 @@ class LinkedMatrix::Filler {
     return result;
   }
 
+  /// The far patches before a position.
+  std::uint32_t far_before(std::uint32_t position) const {
+    const std::size_t k = position > far_begin_ ? position - far_begin_ : 0;
+    return far_before_[std::min(k, far_before_.size() - 1)];
+  }
+
   Range far_in(const Node& node) const {
-    const std::uint32_t begin = far_before_[node.begin];
-    const std::uint32_t end = far_before_[node.begin + node.count];
-    return Range(far_).subspan(begin, end - begin);
+    const std::uint32_t begin = far_before(node.begin);
+    return Range(far_).subspan(begin, far_before(node.begin + node.count) - begin);
   }
 
   void visit(std::uint32_t node, Range near) {
     if (near.empty()) return;
-    for (const std::uint32_t link : matrix_.links_of_node_[node]) follow(link, node, near);
+    // What the links of a node lead to is disjoint.
+    const auto links = matrix_.links_of_node_[node];
+    const auto ends_before = [&](std::uint32_t link) {
+      const Node& to = matrix_.other_end(link, node);
+      return to.begin + to.count <= far_begin_;
+    };
+    for (auto link = std::ranges::partition_point(links, ends_before); link != links.end();
+         ++link) {
+      if (matrix_.other_end(*link, node).begin > far_.back().position) break;
+      follow(*link, node, near);
+    }
     const std::uint32_t child = matrix_.links_.first_child[node];
     if (child == kNone) return;
     const std::uint32_t second = matrix_.nodes_[child + 1].begin;
@@ -101,7 +122,8 @@ class LinkedMatrix::Filler {
 
   const LinkedMatrix& matrix_;
   std::vector<Member> near_, far_;         ///< by position
-  std::vector<std::uint32_t> far_before_;  ///< [n + 1] number of far patches before each position
+  std::uint32_t far_begin_ = 0;            ///< the first position of far_
+  std::vector<std::uint32_t> far_before_;  ///< far patches before each position from there on
   float* entries_;
   Index near_stride_, far_stride_;
 };
@@ -122,6 +144,16 @@ LinkedMatrix::LinkedMatrix(const FormFactorLinks& links,
                                    [&](std::size_t k) { return links.pair[k]; })) {
   for (std::uint32_t k = 0; k < links.patch.size(); ++k) position_[links.patch[k]] = k;
   measure_nodes();
+  sort_links();
+}
+
+void LinkedMatrix::sort_links() {
+#pragma omp parallel for schedule(dynamic, 64)
+  for (std::size_t k = 0; k < nodes_.size(); ++k) {
+    const auto node = static_cast<std::uint32_t>(k);
+    std::ranges::sort(links_of_node_[node], {},
+                      [&](std::uint32_t link) { return other_end(link, node).begin; });
+  }
 }
 
 void LinkedMatrix::measure_nodes() {
@@ -155,25 +187,35 @@ void LinkedMatrix::entries(std::uint32_t /*matrix*/, std::span<const std::uint32
   }
 }
 
-Eigen::MatrixXf LinkedMatrix::multiply(std::uint32_t /*matrix*/, const Eigen::MatrixXf& x) const {
+template <typename Columns>
+void LinkedMatrix::multiply_some(const Eigen::MatrixXf& x, Index begin,
+                                 Eigen::MatrixXf& result) const {
   const std::size_t n = patches_.size();
-  std::vector<float> workspace(product_->workspace_size());
-  std::vector<Float3> in(n), out(n);
-  Eigen::MatrixXf result(x.rows(), x.cols());
-  for (Index begin = 0; begin < x.cols(); begin += kChannelCount) {
-    const Index count = std::min<Index>(kChannelCount, x.cols() - begin);
-    for (std::size_t i = 0; i < n; ++i) {
-      for (Index c = 0; c < count; ++c) {
-        in[i][c] = x(static_cast<Index>(i), begin + c) / std::sqrt(patches_.area[i]);
-      }
-    }
-    product_->gather(in, out, workspace);
-    for (std::size_t i = 0; i < n; ++i) {
-      for (Index c = 0; c < count; ++c) {
-        result(static_cast<Index>(i), begin + c) = out[i][c] * std::sqrt(patches_.area[i]);
-      }
+  const Index count = std::min<Index>(std::tuple_size_v<Columns>, x.cols() - begin);
+  std::vector<Columns> in(n), out(n);
+#pragma omp parallel for schedule(static)
+  for (std::size_t i = 0; i < n; ++i) {
+    for (Index c = 0; c < count; ++c) {
+      in[i][c] = x(static_cast<Index>(i), begin + c) / std::sqrt(patches_.area[i]);
     }
   }
+  product_->gather(std::span<const Columns>(in), std::span(out));
+#pragma omp parallel for schedule(static)
+  for (std::size_t i = 0; i < n; ++i) {
+    for (Index c = 0; c < count; ++c) {
+      result(static_cast<Index>(i), begin + c) = out[i][c] * std::sqrt(patches_.area[i]);
+    }
+  }
+}
+
+Eigen::MatrixXf LinkedMatrix::multiply(std::uint32_t /*matrix*/, const Eigen::MatrixXf& x) const {
+  constexpr Index kMany = 24;
+  Eigen::MatrixXf result(x.rows(), x.cols());
+  Index begin = 0;
+  for (; x.cols() - begin > kChannelCount; begin += kMany) {
+    multiply_some<std::array<float, kMany>>(x, begin, result);
+  }
+  for (; begin < x.cols(); begin += kChannelCount) multiply_some<Float3>(x, begin, result);
   return result;
 }
 

@@ -13,13 +13,15 @@
 namespace rebounce {
 
 /// G = A^1/2 F A^-1/2 from links between sets of patches: one matrix for all channels. Entries are
-/// those that the links stand for; the pairs themselves are not stored.
+/// those that the links stand for; the pairs themselves are not stored. A pair of patches is in one
+/// link at most.
 class LinkedMatrix final : public SymmetricMatrix {
  public:
   /// Links and patches must outlive the object. Throws Error if the links are not of these patches.
   LinkedMatrix(const FormFactorLinks& links, const PatchTable& patches);
 
-  /// `product` is a gathering operator of the same links that the caller shares.
+  /// `product` is a gathering operator of the same links that the caller shares; null where only
+  /// entries are asked for.
   LinkedMatrix(const FormFactorLinks& links, std::shared_ptr<const LinkedFormFactors> product,
                const PatchTable& patches);
 
@@ -38,13 +40,25 @@ class LinkedMatrix final : public SymmetricMatrix {
   class Filler;
 
   void measure_nodes();
+  void sort_links();
+
+  /// The node that a link of `node` leads to.
+  const Node& other_end(std::uint32_t link, std::uint32_t node) const {
+    const auto& [a, b] = links_.pair[link];
+    return nodes_[a == node ? b : a];
+  }
+
+  /// Writes the products with `Columns`::size() columns of `x` from `begin` on, or as many as are
+  /// left.
+  template <typename Columns>
+  void multiply_some(const Eigen::MatrixXf& x, Eigen::Index begin, Eigen::MatrixXf& result) const;
 
   const FormFactorLinks& links_;
   const PatchTable& patches_;
   std::shared_ptr<const LinkedFormFactors> product_;
   std::vector<std::uint32_t> position_;  ///< [n] position of each patch
   std::vector<Node> nodes_;              ///< [m]
-  LinksByNode links_of_node_;
+  LinksByNode links_of_node_;            ///< of each node, by where they lead
 };
 
 }  // namespace rebounce

@@ -26,23 +26,18 @@ void copy_links(std::span<const Link> from, FormFactorLinks& links) {
 }
 
 /// The settings, once they are checked.
-const FormFactorSettings& checked(const FormFactorSettings& settings, std::span<const float> weight,
-                                  std::size_t patch_count) {
+const FormFactorSettings& checked(const FormFactorSettings& settings) {
   check_form_factor_settings(settings);
-  if (!weight.empty() && weight.size() != patch_count) {
-    throw Error("links: weights and patches differ in number");
-  }
   return settings;
 }
 
 }  // namespace
 
 LinkBuilder::LinkBuilder(const PatchModel& model, const RayTracer& tracer,
-                         const FormFactorSettings& settings, std::span<const float> weight)
+                         const FormFactorSettings& settings)
     : geometry_(model, tracer),
       shadow_rays_(geometry_, settings.seed, settings.kernel_tolerance),
-      links_(model, shadow_rays_, tracer, checked(settings, weight, model.patches.size()), weight) {
-}
+      links_(model, shadow_rays_, tracer, checked(settings)) {}
 
 LinkBuild LinkBuilder::build(double epsilon, const Progress& progress) {
   if (!(epsilon > 0)) throw Error("links: link_epsilon must be above 0");

@@ -29,11 +29,8 @@ struct LinkBuild : EscapedLight {
 class LinkBuilder {
  public:
   /// `tracer` holds the first surface_count triangles of model.mesh; both must outlive the object.
-  /// `weight` [n] >= 0 is the weight of errors in the light from each patch, for instance its
-  /// radiosity divided by the mean ("BF refinement"); empty: 1. Throws Error if a setting is out of
-  /// range.
-  LinkBuilder(const PatchModel& model, const RayTracer& tracer, const FormFactorSettings& settings,
-              std::span<const float> weight = {});
+  /// Throws Error if a setting is out of range.
+  LinkBuilder(const PatchModel& model, const RayTracer& tracer, const FormFactorSettings& settings);
 
   // Its parts refer to each other.
   LinkBuilder(const LinkBuilder&) = delete;

@@ -97,20 +97,25 @@ PairSums SummedPairTable::sums_of(std::uint32_t row, std::uint32_t column, float
   return sums;
 }
 
-void SummedPairTable::add_up(PositionRange rows, PositionRange columns) {
+bool SummedPairTable::add_up(PositionRange rows, PositionRange columns) {
   rows_ = rows;
   columns_ = columns;
   exchange_.resize(std::size_t{rows.count} * columns.count);
   pairs_.block(rows, columns, exchange_);
-  table_.assign((std::size_t{rows.count} + 1) * (columns.count + 1), PairSums{});
+  if (std::ranges::all_of(exchange_, [](float e) { return e == 0; })) return false;
+  const std::size_t width = std::size_t{columns.count} + 1;
+  table_.resize((std::size_t{rows.count} + 1) * width);
+  std::fill_n(table_.begin(), width, PairSums{});
   const float* exchange = exchange_.data();
   for (std::uint32_t r = 0; r < rows.count; ++r) {
     PairSums row;
+    at(r + 1, 0) = row;
     for (std::uint32_t c = 0; c < columns.count; ++c, ++exchange) {
       if (*exchange != 0) row += sums_of(rows.begin + r, columns.begin + c, *exchange);
       (at(r + 1, c + 1) = row) += at(r, c + 1);
     }
   }
+  return true;
 }
 
 PairSums SummedPairTable::of(PositionRange rows, PositionRange columns) const {

@@ -61,7 +61,7 @@ class LinkedPairs final : public PairSource {
   /// order.
   LinkedPairs(const FormFactorLinks& links, const PatchTable& patches,
               std::span<const std::uint32_t> patch)
-      : matrix_(links, patches), patches_(patches), patch_(patch) {}
+      : matrix_(links, nullptr, patches), patches_(patches), patch_(patch) {}
 
   void block(PositionRange rows, PositionRange columns, std::span<float> exchange) const override;
 
@@ -93,8 +93,9 @@ class SummedPairTable {
                   std::span<const std::uint32_t> patch)
       : pairs_(pairs), patches_(patches), patch_(patch) {}
 
-  /// Sums up the pairs of `rows`, all before `columns`.
-  void add_up(PositionRange rows, PositionRange columns);
+  /// Sums up the pairs of `rows`, all before `columns`. Returns false, and has no sums, if none
+  /// exchanges light.
+  bool add_up(PositionRange rows, PositionRange columns);
 
   /// The sums over some of the rows and some of the columns.
   PairSums of(PositionRange rows, PositionRange columns) const;

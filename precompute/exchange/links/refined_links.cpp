@@ -47,12 +47,11 @@ std::vector<double> further_rays(const LeafLinks& links, const CountedExchange& 
 }  // namespace
 
 RefinedLinks::RefinedLinks(const PatchModel& model, const ShadowRays& shadow_rays,
-                           const RayTracer& tracer, const FormFactorSettings& settings,
-                           std::span<const float> weight)
+                           const RayTracer& tracer, const FormFactorSettings& settings)
     : shadow_rays_(shadow_rays),
       tracer_(tracer),
       settings_(with_more_probes(settings)),
-      tree_(model, shadow_rays.geometry(), weight),
+      tree_(model, shadow_rays.geometry()),
       refinement_(tree_, shadow_rays, tracer, settings_),
       hemispheres_(model, tracer, settings.hemisphere_rays, settings.seed) {}
 
@@ -117,7 +116,7 @@ std::size_t forecast_link_count(const PatchModel& model, const RayTracer& tracer
                                 const FormFactorSettings& settings, const Progress& progress) {
   const PatchGeometry geometry(model, tracer);
   const ShadowRays shadow_rays(geometry, settings.seed, settings.kernel_tolerance);
-  const LinkTree tree(model, geometry, {});
+  const LinkTree tree(model, geometry);
   LinkRefinement refinement(tree, shadow_rays, tracer, with_more_probes(settings));
   return static_cast<std::size_t>(
       refinement.forecast(settings.link_epsilon, kForecastPairs, progress));

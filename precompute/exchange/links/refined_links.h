@@ -18,9 +18,9 @@ namespace rebounce {
 /// Links of a whole scene after refinement and one revision where rows do not add up.
 class RefinedLinks {
  public:
-  /// `weight` is that of LinkTree; all other arguments must outlive the object.
+  /// All arguments must outlive the object.
   RefinedLinks(const PatchModel& model, const ShadowRays& shadow_rays, const RayTracer& tracer,
-               const FormFactorSettings& settings, std::span<const float> weight);
+               const FormFactorSettings& settings);
 
   /// Refines links to `epsilon`, measures what escapes and those between single patches, and
   /// revises the links of patches whose row sum disagrees. When called again, `epsilon` must be

@@ -347,7 +347,7 @@ Picture PictureRenderer::render(const PictureLight& light, const PictureSettings
   if (settings.exposure) check_exposure(*settings.exposure);
   const auto& [data, tracer, surface] = *impl_;
   Picture picture{.width = settings.width, .height = settings.height};
-  if (!is_light(settings.show)) {
+  if (!shows_light(settings.show)) {
     PatchPainter painter(surface, light, settings, data.patches.size());
     picture.pixel = to_float3s(paint_tiles(tracer, surface, settings, painter));
     picture.display_referred = true;

@@ -22,7 +22,7 @@ enum class Show : std::uint8_t {
   kError,      ///< a number per patch in a colour map (viridis)
 };
 
-inline bool is_light(Show show) {
+inline bool shows_light(Show show) {
   return show != Show::kPatches && show != Show::kError;
 }
 

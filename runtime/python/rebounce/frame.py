@@ -144,6 +144,8 @@ class Engine:
             if not named:
                 raise ValueError(f"the scene has no material {material!r}")
         else:
+            if not 0 <= material < len(self._materials):
+                raise _core.Error(f"there is no material {material}; the scene has {len(self._materials)}")
             named = [material]
         for m in named:
             self._core.set_emission_scale(m, [float(x) for x in np.broadcast_to(scale, 3)])
@@ -217,5 +219,7 @@ def solve(
     if method != "transfer":
         radiosity, how = _core.solve(data._core, exitance, method, residual, max_sweeps)
         return Solution(radiosity, **how)
+    if not (np.isfinite(exitance).all() and (exitance >= 0).all()):
+        raise _core.Error("the initial exitance is negative or not finite")
     indirect = (data.transfer @ exitance.T.ravel()).reshape(3, -1).T
     return Solution(exitance + data.reflectance * indirect, 0, math.nan, True, False, math.nan)

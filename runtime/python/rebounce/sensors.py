@@ -21,10 +21,11 @@ class Sensors:
     """Light meters of a scene: linear maps from its light to the illuminance at points.
 
     positions: [m, 3] metres. normals: [m, 3], of any length but 0.
-    rays: of each sensor, at least 1; the noise falls with their number.
+    rays: of each sensor, 1 to 2**20; the noise falls with their number.
     `patches` [m, n] is a csr_matrix and `sky_cells` [m, 146] an array: with radiosity B [n, 3] in lx
     and luminances L [146] in cd/m² the illuminance without lamps is patches @ B + pi sky_cells @ L.
-    Raises ValueError if a shape does not fit or a normal has no length.
+    Raises ValueError if a shape does not fit, a number is not finite or out of range, or a normal has
+    no length.
     """
 
     def __init__(
@@ -43,6 +44,10 @@ class Sensors:
             raise ValueError(
                 f"normals have the shape {list(directions.shape)}, and need {list(points.shape)}"
             )
+        if not (np.isfinite(points).all() and np.isfinite(directions).all()):
+            raise ValueError("a position or a normal is not finite")
+        if not 1 <= rays <= 2**20:
+            raise ValueError(f"rays is {rays}, and must be from 1 to 2**20")
         length = np.linalg.norm(directions, axis=1, keepdims=True)
         if not (length > 0).all():
             raise ValueError("a normal has no length")

@@ -50,7 +50,11 @@ export class TransferLighting {
    * is not part of the surface, moves or is instanced; nothing is changed then.
    */
   attach(object: Object3D): void;
-  /** One frame, to be called before the scene is drawn. */
+  /**
+   * One frame, to be called before the scene is drawn. Direct light of points, spots and suns is that
+   * of the lights of three.js that are in the scene: from other lights of these kinds only the
+   * bounced light is shown.
+   */
   update(lights: Iterable<ThreeLight | Light>, sky?: LightingSky): void;
   /**
    * The same surface once more, for other bounced light at the vertices of the file; it stays until

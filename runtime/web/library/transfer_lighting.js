@@ -107,6 +107,7 @@ reflectedLight.directDiffuse *= rebounceParts.x;
 reflectedLight.directSpecular *= rebounceParts.x;`);
     };
     material.customProgramCacheKey = () => 'rebounce';
+    material.needsUpdate = true;  // it may have been drawn before
     return material;
   }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <sstream>
@@ -150,11 +151,14 @@ TEST_F(ViewFactorsCommand, AddsExchangeFactorsOfAnEnclosure) {
 TEST_F(ViewFactorsCommand, RefusesInOneLine) {
   const std::string squares = write("squares.obj", kSquares);
   expect_refused({"view-factors", squares, "-o", path("f.npz"), "--closed"}, "no enclosure");
-  expect_refused({"view-factors", path("no.stl"), "-o", path("f.npz")}, "cannot read");
+  expect_refused({"view-factors", path("no.stl"), "-o", path("f.npz")}, "cannot open");
   expect_refused({"view-factors", write("bad.obj", "v 0 0\n"), "-o", path("f.npz")},
                  "bad.obj, line 1: a number is missing");
   expect_refused({"view-factors", squares, "-o", path("f.csv")}, "no format has names that end in");
   EXPECT_FALSE(std::filesystem::exists(path("f.csv")));
+  std::filesystem::create_directory(path("f.sky.mtx"));
+  expect_refused({"view-factors", squares, "-o", path("f.mtx")}, "f.sky.mtx: it is not a regular");
+  EXPECT_FALSE(std::filesystem::exists(path("f.mtx")));
   expect_failure({"view-factors", squares, "-o", path("case"), "--case", "1"},
                  "must be three digits", test::kUsage);
 }

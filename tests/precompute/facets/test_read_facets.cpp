@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <filesystem>
 
 #include "tests/support/expect_error.h"
 #include "tests/support/temporary_folder.h"
@@ -77,7 +78,9 @@ TEST_F(ReadFacets, OfView3d) {
 }
 
 TEST_F(ReadFacets, RefusesWhatItCannotUse) {
-  test::expect_error([&] { read_facets(folder_ / "no.stl"); }, "cannot read");
+  test::expect_error([&] { read_facets(folder_ / "no.stl"); }, "cannot open");
+  std::filesystem::create_directory(folder_ / "folder.obj");
+  test::expect_error([&] { read_facets(folder_ / "folder.obj"); }, "folder.obj: Is a directory");
   expect_refused("a.ply", "ply", "give an .stl, .obj or .vs3 file");
   expect_refused("a.stl", "solid nothing\n", "has no facets");
   expect_refused("b.stl", binary_stl(3, "cut off").substr(0, 150), "has no facets");

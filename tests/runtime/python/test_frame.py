@@ -84,6 +84,9 @@ def test_solve_by_every_method(cornell, method):
         rebounce.solve(cornell, np.ones(3), method)
     with pytest.raises(ValueError, match="method must be one of"):
         rebounce.solve(cornell, engine.initial_exitance, "magic")
+    for wrong in (np.nan, -1, np.inf):
+        with pytest.raises(rebounce.Error, match="not finite"):
+            rebounce.solve(cornell, np.full((cornell.patch_count, 3), wrong), method)
 
 
 def test_lights_of_a_file():
@@ -154,6 +157,9 @@ def test_emission_by_the_name_of_a_material(cornell):
     assert before.max() > 0 and np.allclose(engine.initial_exitance, 0.5 * before, rtol=1e-5)
     with pytest.raises(ValueError, match="no material"):
         engine.set_emission_scale("nothing", 1)
+    for number in (-1, len(names)):
+        with pytest.raises(rebounce.Error, match="no material"):
+            engine.set_emission_scale(number, 1)
 
 
 def open_box():
@@ -184,6 +190,14 @@ def test_sensors_see_sky_and_lamps():
     assert np.allclose(sensors.direct([lamp])[1], 0)
     with pytest.raises(ValueError, match="normals"):
         rebounce.Sensors(data, positions, normals[:1])
+    for bad in (np.nan, np.inf):
+        with pytest.raises(ValueError, match="not finite"):
+            rebounce.Sensors(data, [[1, bad, 1], [1, 1, 1]], normals)
+        with pytest.raises(ValueError, match="not finite"):
+            rebounce.Sensors(data, positions, [[0, bad, 0], [0, 1, 0]])
+    for rays in (0, 2**21):
+        with pytest.raises(ValueError, match="rays"):
+            rebounce.Sensors(data, positions, normals, rays=rays)
 
 
 @pytest.mark.parametrize("kind", [1, 5, 12])

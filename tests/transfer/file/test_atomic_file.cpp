@@ -86,6 +86,15 @@ TEST(AtomicFile, WritesThroughASymbolicLink) {
     file.commit();
   }
   EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
+  // Links to a link to a file that does not exist.
+  std::filesystem::create_symlink("elsewhere/new", folder / "first");
+  std::filesystem::create_symlink(folder / "first", folder / "second");
+  AtomicFile(folder / "second").commit();
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "first"));
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "second"));
+  EXPECT_TRUE(std::filesystem::is_regular_file(folder / "elsewhere/new"));
+  std::filesystem::create_symlink("circle", folder / "circle");
+  test::expect_error([&] { AtomicFile file(folder / "circle"); }, "circle: Too many levels");
   EXPECT_EQ(test::read_bytes(folder / "elsewhere/file"), "new");
 }
 

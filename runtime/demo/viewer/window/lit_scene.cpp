@@ -142,7 +142,7 @@ float LitScene::find_exposure(std::span<const Light> lights, const Sky& sky, con
                        .indirect_irradiance = indirect(Side::kFirst),
                        .emitted_irradiance = emitted_,
                        .reflected_exitance = reflected_[index(Side::kFirst)]},
-                      camera, is_light(show) ? show : Show::kRadiosity);
+                      camera, shows_light(show) ? show : Show::kRadiosity);
 }
 
 }  // namespace rebounce

@@ -35,9 +35,8 @@ PatchModel model_of(const Scene& scene, std::size_t patch_count = 600) {
   return make_patch_model(scene, {.patch_count = patch_count});
 }
 
-LinkBuild links_of(const PatchModel& model, double epsilon = kLinkEpsilon,
-                   std::span<const float> weight = {}) {
-  return LinkBuilder(model, test::make_tracer(model), {}, weight).build(epsilon);
+LinkBuild links_of(const PatchModel& model, double epsilon = kLinkEpsilon) {
+  return LinkBuilder(model, test::make_tracer(model), {}).build(epsilon);
 }
 
 FormFactors form_factors_of(const PatchModel& model) {
@@ -194,14 +193,6 @@ TEST(Links, AreMadeFinerFromCoarserOnes) {
   EXPECT_LT(error(finer), 1.1 * error(alone));
 }
 
-TEST(Links, WeightsDecideWhereErrorsMatter) {
-  const PatchModel model = model_of(test::furnished_room(), 300);
-  const std::vector<float> ones(model.patches.size(), 1.0F), fewer(model.patches.size(), 0.1F);
-  const std::size_t unweighted = links_of(model).links.pair.size();
-  EXPECT_EQ(links_of(model, kLinkEpsilon, ones).links.pair.size(), unweighted);
-  EXPECT_EQ(links_of(model, 0.1 * kLinkEpsilon, fewer).links.pair.size(), unweighted);
-}
-
 TEST(Links, AreForecastFromASample) {
   // More pairs of nodes than the sample in most generations.
   const auto& [model, build, pairs] = furnished();
@@ -343,14 +334,12 @@ TEST(Links, StopWhenAskedTo) {
 TEST(Links, RefuseSettingsOutOfRange) {
   const PatchModel model = model_of(test::furnished_room(), 50);
   const RayTracer tracer = test::make_tracer(model);
-  const std::vector<float> few(3, 1.0F);
   LinkBuilder builder(model, tracer, {});
   EXPECT_THROW(builder.build(0), Error);
   EXPECT_THROW(builder.build(-1), Error);
   builder.build(1e-2);
   EXPECT_THROW(builder.build(1e-2), Error);
   EXPECT_THROW(LinkBuilder(model, tracer, {.probe_rays = 257}), Error);
-  EXPECT_THROW(LinkBuilder(model, tracer, {}, few), Error);
 }
 
 }  // namespace
