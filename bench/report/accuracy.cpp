@@ -20,8 +20,12 @@ namespace {
 /// whose own solution is off by many times what is left.
 constexpr double kConverged = 3e-5, kLeftOfError = 0.05;
 
-/// Iterations are looked at after each sweep, up to so many.
-constexpr int kMostSweeps = 100;
+/// Iterations are looked at after each sweep, up to so many. Those that begin anew for each look
+/// are looked at after each of the first, and then at steps of an eighth.
+constexpr int kMostSweeps = 100, kMostAnew = 48, kEachAnew = 16, kStepAnew = 8;
+
+/// An iteration whose error is above this part of that two looks before has stalled or diverged.
+constexpr double kStalled = 0.98;
 
 /// More than the caches of most processors hold.
 constexpr std::size_t kCacheBytes = std::size_t{96} << 20;
@@ -34,6 +38,11 @@ constexpr std::array kTimedSweeps = {1, 2, 6};
 
 /// Sweeps of one frame at most.
 constexpr int kMostFrameSweeps = 64;
+
+/// The number of sweeps after which an iteration is looked at next.
+int next_look(int sweeps, bool anew) {
+  return anew && sweeps >= kEachAnew ? sweeps + sweeps / kStepAnew : sweeps + 1;
+}
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -126,9 +135,13 @@ class AccuracyBench {
         }
         continue;
       }
-      for (int sweeps = 1; sweeps <= kMostSweeps; ++sweeps) {
+      const bool anew = contestants_[contestant].sweeps_of_cuts() == 0;
+      std::vector<double> errors;
+      const int most = anew ? kMostAnew : kMostSweeps;
+      for (int sweeps = 1; sweeps <= most; sweeps = next_look(sweeps, anew)) {
         rows.push_back(row(contestant, first, sweeps, *method, cuts));
-        if (has_converged(rows.back())) break;
+        errors.push_back(rows.back().iteration_error);
+        if (has_converged(rows.back()) || has_stalled(errors)) break;
       }
     }
     return rows;
@@ -171,6 +184,10 @@ class AccuracyBench {
 
   static bool has_converged(const AccuracyRow& row) {
     return row.iteration_error < std::max(kConverged, kLeftOfError * row.error);
+  }
+
+  static bool has_stalled(const std::vector<double>& errors) {
+    return errors.size() > 2 && !(errors.back() < kStalled * errors[errors.size() - 3]);
   }
 
   static Start start_of(const AccuracyRow& row) { return {row.contestant, row.cold}; }
