@@ -29,8 +29,12 @@ import tables
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SCENES = ("cornell_box", "two_rooms", "furnished_room", "pavilion", "white_room")
-SIZES, QUICK_SIZES = (1000, 4000, 16000), (1000,)
-TINY = (("cornell_box", 100), ("cornell_box", 300))
+SIZES, QUICK_SIZES = (1000, 4000), (1000,)
+# Sizes that some of the scenes have beside these; the largest take half an hour each.
+FURTHER = (
+    ("cornell_box", 100), ("cornell_box", 300),
+    ("two_rooms", 16000), ("furnished_room", 16000), ("white_room", 16000),
+)
 
 # Seconds that a measurement takes on two cores that do nothing else: those of any size, and those
 # of 1,000 patches, which grow with this exponent of their number (lab/128). What finished ones took
@@ -111,7 +115,7 @@ def list_jobs(options, folder):
     scenes = list_scenes(options)
     jobs = [Job(scene, n, folder) for n in sorted(sizes) for scene in scenes]
     if not options.quick and not options.only and not options.sizes:
-        jobs += [Job(ROOT / f"tests/scenes/{name}.gltf", n, folder) for name, n in TINY]
+        jobs += [Job(ROOT / f"tests/scenes/{name}.gltf", n, folder) for name, n in FURTHER]
     return jobs
 
 

@@ -40,8 +40,8 @@ COMMAND_LINE = """# Command line
 
 One program, `rebounce`, with a command for each task. Long work shows its progress and stops cleanly
 on Ctrl-C. The exit status is 0 when all is done, 1 when the input or a file is bad (one line says
-what, where, and what to do), and 2 when a command, an option or
-the kind of a value is unknown. [Summaries for scripts](json.md)
+what, where, and what to do) or when the file that was written misses its tolerance (the line says
+so), and 2 when a command, an option or the kind of a value is unknown. [Summaries for scripts](json.md)
 has the fields of `--json`."""
 
 C_INTERFACE = """# C interface

@@ -9,7 +9,7 @@ import rebounce
 room = pathlib.Path(__file__).parents[3] / "tests/scenes/cornell_box.gltf"
 data = rebounce.precompute(room, patches=500, tolerance=0.01)
 engine = rebounce.Engine(data)
-for x in np.linspace(-0.5, 0.5, 5):
-    engine.relight([rebounce.Light(position=(x, 1.8, 0), intensity=80)])
+for x in np.linspace(0.1, 0.5, 5):
+    engine.relight([rebounce.Light(position=(x, 0.4, 0.2), intensity=20)])
     flux = data.area @ engine.radiosity
     print(f"lamp at x = {x:+.2f} m: {flux.round(1)} lm leave the walls")
