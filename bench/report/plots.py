@@ -98,6 +98,10 @@ def frames(result, budget, path):
     return save(figure, path)
 
 
+# The powers of two that have shades of their own, and the part of these that is dark.
+SHADES, DARK = 4, 0.75
+
+
 def winners(all_results, path):
     """How many times faster the inverse is than Gauss-Seidel, by change and error; blue: it is not."""
     figure, axes = plt.subplots(
@@ -112,8 +116,9 @@ def winners(all_results, path):
                 claim = claims.equal_error(result, change, target)
                 if claim is not None:
                     ratio[y, x] = claim.ratio
-                    panel.text(x, y, formats.times(claim.ratio), ha="center", va="center", fontsize=8)
-        panel.imshow(np.log2(ratio), cmap="RdBu_r", vmin=-4, vmax=4, aspect="auto")
+                    colour = "white" if abs(np.log2(claim.ratio)) > DARK * SHADES else "black"
+                    panel.text(x, y, formats.times(claim.ratio), ha="center", va="center", fontsize=8, color=colour)
+        panel.imshow(np.log2(ratio), cmap="RdBu_r", vmin=-SHADES, vmax=SHADES, aspect="auto")
         panel.set_xticks(range(len(results.TARGETS)), [f"{t:g}" for t in results.TARGETS])
         panel.set_yticks(range(len(changes)), changes if changes != labelled else [])
         labelled = changes
