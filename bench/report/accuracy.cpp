@@ -20,12 +20,16 @@ namespace {
 /// whose own solution is off by many times what is left.
 constexpr double kConverged = 3e-5, kLeftOfError = 0.05;
 
-/// Iterations are looked at after each sweep, up to so many. Those that begin anew for each look
-/// are looked at after each of the first, and then at steps of an eighth.
-constexpr int kMostSweeps = 100, kMostAnew = 48, kEachAnew = 16, kStepAnew = 8;
+/// The run of a lamp ends at this part of both, so that the mean over lamps goes on as if none had.
+constexpr double kPartOfALamp = 1.0 / 3;
 
-/// An iteration whose error is above this part of that two looks before has stalled or diverged.
+/// Iterations are looked at after each sweep, up to so many.
+constexpr int kMostSweeps = 100;
+
+/// An iteration whose error is above this part of that two sweeps before has stalled or diverged,
+/// but for the first sweeps, after which light may still be on its way.
 constexpr double kStalled = 0.98;
+constexpr std::size_t kFirstSweeps = 6;
 
 /// More than the caches of most processors hold.
 constexpr std::size_t kCacheBytes = std::size_t{96} << 20;
@@ -38,11 +42,6 @@ constexpr std::array kTimedSweeps = {1, 2, 6};
 
 /// Sweeps of one frame at most.
 constexpr int kMostFrameSweeps = 64;
-
-/// The number of sweeps after which an iteration is looked at next.
-int next_look(int sweeps, bool anew) {
-  return anew && sweeps >= kEachAnew ? sweeps + sweeps / kStepAnew : sweeps + 1;
-}
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -106,12 +105,6 @@ class AccuracyBench {
     return own_.at(contestant.form)[k];
   }
 
-  /// A solution that a run goes on from.
-  struct Cut {
-    int sweeps = 0;
-    std::vector<Float3> radiosity;
-  };
-
   void begin(const Contestant& contestant, std::size_t k, Method& method) const {
     method.set_reflectance(cases_[k].reflectance);
     if (cases_[k].cold) {
@@ -125,69 +118,72 @@ class AccuracyBench {
   std::vector<AccuracyRow> errors_of(std::size_t contestant) const {
     const auto method = contestants_[contestant].make(contenders_);
     std::vector<AccuracyRow> rows;
-    for (std::size_t first = 0; first < cases_.size();
-         first += static_cast<std::size_t>(settings_.lamp_count)) {
-      std::vector<Cut> cuts(settings_.lamp_count);
-      if (!method->iterates()) {
-        // Wherever iterations start from, a product is the same.
-        if (rows.empty() || rows.back().change != cases_[first].change) {
-          rows.push_back(row(contestant, first, 0, *method, cuts));
-        }
-        continue;
+    const auto lamp_count = static_cast<std::size_t>(settings_.lamp_count);
+    for (std::size_t first = 0; first < cases_.size(); first += lamp_count) {
+      // Wherever iterations start from, a product is the same.
+      const bool again = !rows.empty() && rows.back().change == cases_[first].change;
+      if (!method->iterates() && again) continue;
+      std::vector<Course> courses;
+      for (std::size_t k = first; k < first + lamp_count; ++k) {
+        courses.push_back(course_of(contestant, k, *method));
       }
-      const bool anew = contestants_[contestant].sweeps_of_cuts() == 0;
-      std::vector<double> errors;
-      const int most = anew ? kMostAnew : kMostSweeps;
-      for (int sweeps = 1; sweeps <= most; sweeps = next_look(sweeps, anew)) {
-        rows.push_back(row(contestant, first, sweeps, *method, cuts));
-        errors.push_back(rows.back().iteration_error);
-        if (has_converged(rows.back()) || has_stalled(errors)) break;
-      }
+      add_rows(contestant, first, method->iterates(), courses, rows);
     }
     return rows;
   }
 
-  /// Finds the solution of a case after `sweeps`, from the last cut.
-  void run(std::size_t contestant, std::size_t k, int sweeps, Method& method, Cut& cut) const {
+  /// The errors of one lamp after each sweep, as far as it was looked at, or after the product.
+  struct Course {
+    std::vector<double> error, iteration_error;
+  };
+
+  Course course_of(std::size_t contestant, std::size_t k, Method& method) const {
+    Course course;
+    const auto error = [&](std::span<const Float3> radiosity, const std::vector<Float3>& truth) {
+      return reflected_error(radiosity, truth, cases_[k].after, contenders_.data->patches.area);
+    };
+    const auto look = [&](std::span<const Float3> radiosity) {
+      course.error.push_back(error(radiosity, cases_[k].truth));
+      course.iteration_error.push_back(
+          method.iterates() ? error(radiosity, own_solution(contestants_[contestant], k))
+                            : course.error.back());
+      const double left = course.iteration_error.back() / kPartOfALamp;
+      return !has_converged(left, course.error.back()) && !has_stalled(course.iteration_error);
+    };
     begin(contestants_[contestant], k, method);
-    if (cut.sweeps > 0) method.start_from(cut.radiosity);
-    method.run(cases_[k].after, sweeps - cut.sweeps);
-    const int period = contestants_[contestant].sweeps_of_cuts();
-    if (period == 0 || sweeps % period != 0) return;
-    cut.sweeps = sweeps;
-    cut.radiosity.assign(method.radiosity().begin(), method.radiosity().end());
+    method.watch(cases_[k].after, kMostSweeps, look);
+    if (course.error.empty()) look(method.radiosity());  // no light, no sweeps
+    return course;
   }
 
-  /// Over the lamps of the change whose first case is `first`; `cuts` are theirs.
-  AccuracyRow row(std::size_t contestant, std::size_t first, int sweeps, Method& method,
-                  std::vector<Cut>& cuts) const {
-    AccuracyRow result{.contestant = contestant,
-                       .change = cases_[first].change,
-                       .sweeps = sweeps,
-                       .cold = method.iterates() && cases_[first].cold};
-    for (std::size_t k = first; k < first + settings_.lamp_count; ++k) {
-      run(contestant, k, sweeps, method, cuts[k - first]);
-      const auto error = [&](const std::vector<Float3>& truth) {
-        return reflected_error(method.radiosity(), truth, cases_[k].after,
-                               contenders_.data->patches.area);
-      };
-      const double against_reference = error(cases_[k].truth);
-      result.error += against_reference / settings_.lamp_count;
-      result.error_max = std::max(result.error_max, against_reference);
-      result.iteration_error +=
-          (method.iterates() ? error(own_solution(contestants_[contestant], k))
-                             : against_reference) /
-          settings_.lamp_count;
-    }
-    return result;
-  }
-
-  static bool has_converged(const AccuracyRow& row) {
-    return row.iteration_error < std::max(kConverged, kLeftOfError * row.error);
+  static bool has_converged(double iteration_error, double error) {
+    return iteration_error < std::max(kConverged, kLeftOfError * error);
   }
 
   static bool has_stalled(const std::vector<double>& errors) {
-    return errors.size() > 2 && !(errors.back() < kStalled * errors[errors.size() - 3]);
+    return errors.size() > kFirstSweeps && !(errors.back() < kStalled * errors[errors.size() - 3]);
+  }
+
+  /// A row for each number of sweeps until the mean over the lamps has converged, of the change
+  /// whose first case is `first`. A lamp that has ended stays as it is.
+  void add_rows(std::size_t contestant, std::size_t first, bool iterates,
+                const std::vector<Course>& courses, std::vector<AccuracyRow>& rows) const {
+    std::size_t most = 0;
+    for (const Course& course : courses) most = std::max(most, course.error.size());
+    for (std::size_t look = 0; look < most; ++look) {
+      AccuracyRow row{.contestant = contestant,
+                      .change = cases_[first].change,
+                      .sweeps = iterates ? static_cast<int>(look) + 1 : 0,
+                      .cold = iterates && cases_[first].cold};
+      for (const Course& course : courses) {
+        const std::size_t at = std::min(look, course.error.size() - 1);
+        row.error += course.error[at] / settings_.lamp_count;
+        row.error_max = std::max(row.error_max, course.error[at]);
+        row.iteration_error += course.iteration_error[at] / settings_.lamp_count;
+      }
+      rows.push_back(row);
+      if (has_converged(row.iteration_error, row.error)) break;
+    }
   }
 
   static Start start_of(const AccuracyRow& row) { return {row.contestant, row.cold}; }

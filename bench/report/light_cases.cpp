@@ -51,12 +51,19 @@ void solve_truths(const TransferData& data, std::vector<LightCase>& cases,
   const auto found = std::ranges::find(cases, kRepainted, &LightCase::change);
   if (found != cases.end()) repainted.reflectance = found->reflectance;
   const ReferenceSolver usual(data.exchange, data.patches), other(data.exchange, repainted);
-  const Progress part = [&](double done) { return progress("reference", done); };
-  in_parallel(cases.size(), part, [&](std::size_t k) {
-    LightCase& lit = cases[k];
-    const ReferenceSolver& solver = lit.change == kRepainted ? other : usual;
-    lit.truth = rounded(solver.radiosity(lit.after, kReferenceResidual));
-  });
+  for (std::size_t k = 0, end = 0; k < cases.size(); k = end) {
+    if (!progress("reference", static_cast<double>(k) / static_cast<double>(cases.size()))) {
+      throw Cancelled();
+    }
+    std::vector<std::vector<Float3>> lights;
+    while (end < cases.size() && cases[end].change == cases[k].change &&
+           lights.size() < ReferenceSolver::kBatchLights) {
+      lights.push_back(cases[end++].after);
+    }
+    const ReferenceSolver& solver = cases[k].change == kRepainted ? other : usual;
+    const auto truths = solver.radiosities(lights, kReferenceResidual);
+    for (std::size_t l = 0; l < lights.size(); ++l) cases[k + l].truth = rounded(truths[l]);
+  }
 }
 
 }  // namespace

@@ -31,6 +31,11 @@ class ProductMethod final : public Method {
     add_reflected(initial_exitance, reflectance_, radiosity_, radiosity_);
     return 0;
   }
+  void watch(std::span<const Float3> initial_exitance, int sweeps,
+             const RadiositySolver::Monitor& monitor) override {
+    run(initial_exitance, sweeps);
+    monitor(radiosity_);
+  }
   std::span<const Float3> radiosity() const override { return radiosity_; }
   bool iterates() const override { return false; }
   void reset() override {}
@@ -54,6 +59,12 @@ class IterativeMethod final : public Method {
     const SolveSettings settings{
         .max_sweeps = sweeps, .residual = residual, .measure_residual = false};
     return solver_->solve(initial_exitance, settings).sweeps;
+  }
+  void watch(std::span<const Float3> initial_exitance, int sweeps,
+             const RadiositySolver::Monitor& monitor) override {
+    solver_->set_monitor(monitor);
+    run(initial_exitance, sweeps);
+    solver_->set_monitor({});
   }
   std::span<const Float3> radiosity() const override { return solver_->radiosity(); }
   bool iterates() const override { return true; }
@@ -174,12 +185,6 @@ std::unique_ptr<Method> Contestant::make(const Contenders& contenders) const {
   const auto stored = transfer.empty() ? nullptr : contenders.transfer(transfer);
   return std::make_unique<IterativeMethod>(
       make_solver(method, *contenders.form(form), {patches.area, patches.reflectance}, stored));
-}
-
-int Contestant::sweeps_of_cuts() const {
-  if (product) return 0;
-  if (method == SolveMethod::kSymmetricGaussSeidel) return 2;  // there and back
-  return method == SolveMethod::kGaussSeidel || method == SolveMethod::kGathering ? 1 : 0;
 }
 
 std::vector<Contestant> list_contestants(const Contenders& contenders,

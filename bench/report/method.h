@@ -23,6 +23,10 @@ class Method {
     return run(initial_exitance, sweeps, 0);
   }
 
+  /// The same, and calls `monitor` after each sweep, or the product; false ends the run.
+  virtual void watch(std::span<const Float3> initial_exitance, int sweeps,
+                     const RadiositySolver::Monitor& monitor) = 0;
+
   /// The last solution [n] in lx; valid until the next run.
   virtual std::span<const Float3> radiosity() const = 0;
 
@@ -50,10 +54,6 @@ struct Contestant {
   bool product = false;
 
   std::unique_ptr<Method> make(const Contenders& contenders) const;
-
-  /// A run may be cut after a multiple of so many sweeps, and goes on from the solution there as if
-  /// it had not been; 0: it may not.
-  int sweeps_of_cuts() const;
 };
 
 /// Every method on every form that it can use.

@@ -117,6 +117,12 @@ SolveResult RadiositySolver::solve(std::span<const Float3> initial_exitance,
   return result;
 }
 
+bool RadiositySolver::monitor_ends() {
+  if (!monitor_) return false;
+  finish();
+  return !monitor_(radiosity_);
+}
+
 SolveResult RadiositySolver::iterate(const SolveSettings& settings, Clock::time_point start) {
   SolveResult result;
   const double norm = area_norm(initial_exitance_, area_);
@@ -143,8 +149,8 @@ SolveResult RadiositySolver::iterate(const SolveSettings& settings, Clock::time_
     since_best = result.residual < best ? 0 : since_best + 1;
     best = std::min(best, result.residual);
     const bool there = settings.residual > 0 && result.residual <= settings.residual;
-    const bool last = report.stuck || report.diverged || result.sweeps >= settings.max_sweeps ||
-                      Clock::now() >= deadline_ ||
+    const bool last = monitor_ends() || report.stuck || report.diverged ||
+                      result.sweeps >= settings.max_sweeps || Clock::now() >= deadline_ ||
                       (settings.residual > 0 && since_best >= kPatience);
     if (!there && !last) continue;
 

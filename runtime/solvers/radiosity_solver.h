@@ -1,8 +1,10 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "rebounce/solvers.h"
@@ -35,6 +37,12 @@ class RadiositySolver {
   /// Does the same and copies the solution [n] in lx to `radiosity`.
   SolveResult solve(std::span<const Float3> initial_exitance, const SolveSettings& settings,
                     std::span<Float3> radiosity);
+
+  /// Called after each sweep of a solve with the solution B [n] in lx so far; false ends the solve.
+  using Monitor = std::function<bool(std::span<const Float3>)>;
+
+  /// Sets it for all further solves; an empty one calls nothing.
+  void set_monitor(Monitor monitor) { monitor_ = std::move(monitor); }
 
   /// The last solution B [n] in lx; valid until the next solve.
   std::span<const Float3> radiosity() const { return radiosity_; }
@@ -88,9 +96,11 @@ class RadiositySolver {
   using Clock = std::chrono::steady_clock;
 
   SolveResult iterate(const SolveSettings& settings, Clock::time_point start);
+  bool monitor_ends();
   void check(std::span<const Float3> initial_exitance, const SolveSettings& settings) const;
 
   bool cold_ = true;
+  Monitor monitor_;
   Clock::time_point deadline_ = Clock::time_point::max();
 };
 

@@ -346,6 +346,28 @@ TEST_P(EveryMethod, OneOffIsTheColdSolve) {
   EXPECT_EQ(copy(solver->radiosity()), radiosity);
 }
 
+TEST_P(EveryMethod, AMonitorSeesWhatShorterSolvesEndWith) {
+  const Case c = make_case(0.8F);
+  const auto watched = c.solver(method());
+  std::vector<std::vector<Float3>> seen;
+  watched->set_monitor([&](std::span<const Float3> radiosity) {
+    seen.push_back(copy(radiosity));
+    return seen.size() < 3;
+  });
+  const SolveSettings settings = {.max_sweeps = 100, .residual = 0, .measure_residual = false};
+  EXPECT_EQ(watched->solve(c.system.initial_exitance, settings).sweeps, 3);
+  ASSERT_EQ(seen.size(), 3U);
+  EXPECT_EQ(copy(watched->radiosity()), seen.back());
+  for (int sweeps = 1; sweeps <= 3; ++sweeps) {
+    const auto solver = c.solver(method());
+    solver->solve(c.system.initial_exitance, {.max_sweeps = sweeps, .residual = 0});
+    EXPECT_EQ(copy(solver->radiosity()), seen[sweeps - 1]) << sweeps;
+  }
+  watched->set_monitor({});
+  watched->solve(c.system.initial_exitance, settings);
+  EXPECT_EQ(seen.size(), 3U);
+}
+
 TEST_P(EveryMethod, TimeBudgetEndsASolve) {
   const Case c = make_case(0.8F);
   const SolveResult result = c.solver(method())->solve(
