@@ -25,17 +25,24 @@ constexpr double kOperatorBytes = 6.7e3, kRoomCouplings = 450, kOperatorGrowth =
 constexpr double kCouplingBytes = 1.3;
 
 // Of a patch while a dense operator is compressed, beside the lights: candidates of the search and
-// the light that they are judged by; blocks that are at work, at most so much (lab/114).
-constexpr std::size_t kSearchBytes = 7000, kWorkBytes = 16000, kMostWorkBytes = 8'000'000;
+// the light that they are judged by (lab/114).
+constexpr std::size_t kSearchBytes = 7000;
+
+// Of blocks that are at work while an operator is compressed (lab/114, lab/162).
+std::size_t work_bytes(std::size_t patch_count) {
+  constexpr std::size_t kOfPatch = 16000, kMost = 8'000'000;
+  return std::min(kMost, kOfPatch * patch_count);
+}
 
 }  // namespace
 
 MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::size_t matrix_count,
                                                  const MatrixFreeTransferSettings& settings,
                                                  std::uint64_t coupling_count) {
-  constexpr std::size_t kBlasBytes = 20'000'000;  // of OpenBLAS, for each thread but the first
-  constexpr std::size_t kGroupsOfThread = 4;      // of a run, so that all threads end together
-  constexpr std::size_t kVectors = 9;             // what is sent, those of the solver, coefficients
+  // Of OpenBLAS, for each thread but the first (lab/162).
+  constexpr std::size_t kBlasBytes = 12'000'000;
+  constexpr std::size_t kGroupsOfThread = 4;  // of a run, so that all threads end together
+  constexpr std::size_t kVectors = 9;         // what is sent, those of the solver, coefficients
   constexpr std::size_t kBatchColumns = SolvedTransfer::kBatchColumns;
   const std::size_t group = kVectors * patch_count * kBatchColumns * sizeof(float);
   const std::size_t side =
@@ -49,7 +56,7 @@ MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::s
                       std::pow(kDefaultTolerance / settings.compression.tolerance, kOperatorGrowth);
   const double couplings = std::max(kRoomCouplings * rows, static_cast<double>(coupling_count));
   const std::size_t kept =
-      patch_count * kFittingLightBytes +
+      patch_count * kFittingLightBytes + work_bytes(patch_count) +
       static_cast<std::size_t>(kOperatorBytes * rows + kCouplingBytes * couplings);
 
   MatrixFreeTransferPlan plan;
@@ -65,8 +72,7 @@ MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::s
 std::uint64_t dense_compression_peak_bytes(std::size_t patch_count, std::size_t matrix_count) {
   const std::uint64_t triangle = static_cast<std::uint64_t>(patch_count) * patch_count / 2;
   return triangle * sizeof(float) * matrix_count +
-         patch_count * (kFittingLightBytes + kSearchBytes) +
-         std::min(kMostWorkBytes, kWorkBytes * patch_count);
+         patch_count * (kFittingLightBytes + kSearchBytes) + work_bytes(patch_count);
 }
 
 /// Throws Error if there is a memory limit and a plan does not fit into it.

@@ -200,9 +200,9 @@ export class Engine {
     lights.forEach((light, k) => writeLight(light, plain, k));
     const color = triple(sky.color ?? [1, 1, 1], 'sky: color');
     this.#instance.floats(this.#sky, 4).set([...color, sky.luminance ?? 0]);
-    this.#lightCount = lights.length;
     this.#instance.check('rebounce_web_relight', address, this.#lights.address, lights.length,
                          this.#sky, this.#milliseconds);
+    this.#lightCount = lights.length;  // of a frame that was not refused
     const [direct, before, product, after] =
         this.#instance.doubles(this.#milliseconds, stages.length);
     Object.assign(this.timings, { direct, product, total: direct + before + product + after });

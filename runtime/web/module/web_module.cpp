@@ -7,6 +7,8 @@
 #include <glm/glm.hpp>
 #include <numbers>
 #include <span>
+#include <utility>
+#include <vector>
 
 #include "rebounce.h"
 #include "runtime/frame/c_handles.h"
@@ -73,14 +75,16 @@ extern "C" {
     rebounce_engine* engine, const PlainLight* lights, std::size_t light_count,
     const std::array<float, 4>* sky, double* milliseconds) {
   return guarded(REBOUNCE_INVALID_ARGUMENT, [&] {
-    engine->lights.resize(light_count);
-    for (std::size_t k = 0; k < light_count; ++k) take_plain(lights[k], engine->lights[k]);
-    check_lights(engine->lights);
+    static std::vector<Light> taken;  // a frame that is refused leaves the engine's as they are
+    taken.resize(light_count);
+    for (std::size_t k = 0; k < light_count; ++k) take_plain(lights[k], taken[k]);
+    check_lights(taken);
     const auto& [red, green, blue, luminance] = *sky;
     Engine::Parts& parts = engine->engine.parts();
     const OneThread guard(parts.use);
     StageClock clock(milliseconds);
-    parts.compute_direct(engine->lights, {{red, green, blue}, luminance, engine->sky_distribution});
+    parts.compute_direct(taken, {{red, green, blue}, luminance, engine->sky_distribution});
+    std::swap(engine->lights, taken);
     clock.end_stage();
     parts.compute_initial_exitance();
     clock.end_stage();

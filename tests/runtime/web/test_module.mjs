@@ -143,6 +143,9 @@ test('what is out of range is refused, and the last frame stays', async () => {
   assert.throws(() => engine.setSky(99, [0, -1, 0]), RebounceError);
   assert.throws(() => engine.setEmissionScale(1000, [1, 1, 1]), /material/);
   assert.deepEqual(engine.indirectIrradiance(), before);
+  assert.throws(() => engine.vertexDirectIrradianceOf([1, 1]), /2 numbers.* 4 lights/);
+  assert.deepEqual(engine.vertexDirectIrradianceOf(lights.map(() => 1)).slice(),
+                   engine.vertexDirectIrradiance());
   engine.relight(lights);
   assert.deepEqual(engine.indirectIrradiance(), before);
   engine.dispose();
