@@ -8,6 +8,7 @@
 #include <set>
 #include <string_view>
 
+#include "precompute/base/thread_limit.h"
 #include "precompute/build/build_decisions.h"
 #include "precompute/build/build_estimate.h"
 #include "precompute/build/exchange_stage.h"
@@ -19,7 +20,6 @@
 #include "precompute/patches/patch_selection.h"
 #include "precompute/patches/winding.h"
 #include "rebounce/version.h"
-#include "runtime/solvers/solve_radiosity.h"
 
 namespace rebounce {
 namespace {
@@ -124,6 +124,7 @@ class TransferBuild {
                        model_.patches.reflectance, roles_, kCompressionPart * decided_.tolerance);
       std::uint64_t& limit = decided_.memory_limit_bytes;
       announce(report_.estimate_after_links.emplace(estimate_after_links(build, limit)));
+      thread_limit_.emplace(thread_count_after_links(build, limit));
       limit -= std::min(limit - 1, build.held_bytes);  // what is left for the other stages
     }
     data_.patches = std::move(model_.patches);
@@ -144,8 +145,7 @@ class TransferBuild {
     } else {
       make_operator_from_pairs(*tracer_, decided_, roles_, data_, report_, clock_);
     }
-    data_.emitted_irradiance = irradiance_from_emitters(data_);
-    add_receiver_rows(model_.shown_patch, *tracer_, decided_, data_, report_, clock_);
+    make_outputs_of_operator(model_.shown_patch, *tracer_, decided_, data_, report_, clock_);
   }
 
   /// All that follows on the scene.
@@ -208,6 +208,7 @@ class TransferBuild {
   PatchSelection receivers_, sources_;
   PatchRoles roles_;
   std::optional<RayTracer> tracer_;
+  std::optional<ThreadLimit> thread_limit_;  ///< of what follows links
 };
 
 }  // namespace

@@ -100,6 +100,13 @@ std::uint64_t bytes_of_threads(std::size_t patch_count) {
                            kThreadBytesOfPatch * patch_count);
 }
 
+MatrixFreeTransferPlan plan_after_links(const LinkedBuild& build, std::uint64_t limit_bytes) {
+  MatrixFreeTransferSettings settings{.compression = {.tolerance = build.tolerance},
+                                      .roles = build.roles};
+  settings.memory_limit_bytes = memory_of_matrix_free_transfer(build, limit_bytes);
+  return plan_matrix_free_transfer(build.scene.patch_count, build.matrix_count, settings);
+}
+
 std::uint64_t bytes_of_weights(const BuiltScene& scene) {
   return kVertexBytes * scene.vertex_count +
          kWeighedBytes * std::min(scene.vertex_count, kWeighedOfPatch * scene.patch_count);
@@ -171,13 +178,13 @@ std::uint64_t peak_bytes_of_links(const LinkedBuild& build) {
 }
 
 std::uint64_t peak_bytes_after_links(const LinkedBuild& build, std::uint64_t limit_bytes) {
-  MatrixFreeTransferSettings settings{.compression = {.tolerance = build.tolerance},
-                                      .roles = build.roles};
-  settings.memory_limit_bytes = memory_of_matrix_free_transfer(build, limit_bytes);
-  const MatrixFreeTransferPlan plan =
-      plan_matrix_free_transfer(build.scene.patch_count, build.matrix_count, settings);
   return bytes_beside_transfer(build) +
-         std::max({plan.peak_bytes, bytes_of_weights(build.scene), build.scene.row_bytes});
+         std::max({plan_after_links(build, limit_bytes).peak_bytes, bytes_of_weights(build.scene),
+                   build.scene.row_bytes});
+}
+
+int thread_count_after_links(const LinkedBuild& build, std::uint64_t limit_bytes) {
+  return plan_after_links(build, limit_bytes).thread_count;
 }
 
 std::uint64_t memory_of_matrix_free_transfer(const LinkedBuild& build, std::uint64_t limit_bytes) {

@@ -62,6 +62,10 @@ std::uint64_t peak_bytes_of_links(const LinkedBuild& build);
 /// at least one.
 std::uint64_t peak_bytes_after_links(const LinkedBuild& build, std::uint64_t limit_bytes);
 
+/// The threads that all stages after links may have, so that they keep the limit if one can: a
+/// thread's buffers stay once a stage has used them.
+int thread_count_after_links(const LinkedBuild& build, std::uint64_t limit_bytes);
+
 /// The part of a limit that remains for build_matrix_free_transfer; 1 if nothing remains.
 std::uint64_t memory_of_matrix_free_transfer(const LinkedBuild& build, std::uint64_t limit_bytes);
 

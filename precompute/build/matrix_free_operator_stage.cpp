@@ -3,13 +3,11 @@
 #include <optional>
 #include <utility>
 
-#include "precompute/base/thread_limit.h"
 #include "precompute/build/build_estimate.h"
 #include "precompute/build/build_record.h"
 #include "precompute/build/kept_tolerances.h"
 #include "precompute/build/operator_stage.h"
 #include "precompute/compression/form_factor_compression.h"
-#include "precompute/compression/matrix_free_plan.h"
 #include "precompute/compression/matrix_free_transfer.h"
 #include "precompute/exchange/links/link_fitting.h"
 #include "precompute/inverse/corrected_solver.h"
@@ -120,8 +118,6 @@ class LinkedOperator {
                                                          data.patches.centroid)) {}
 
   void make(std::span<const std::uint32_t> shown_patch) {
-    // Buffers of threads stay once they are used, so what fits into memory holds for all stages.
-    const ThreadLimit limited(planned_thread_count());
     FormFactorLinks fewer = clock_.run("fewer links", [&](const Progress& part) {
       return fit_links(data_.links, data_.patches, kErrorPerLink, part);
     });
@@ -167,7 +163,7 @@ class LinkedOperator {
         });
   }
 
-  MatrixFreeTransferSettings operator_settings() const {
+  void make_operator() {
     const LinkedBuild build{.scene = built_scene(data_.patches.size(), data_.mesh),
                             .link_count = data_.links.pair.size(),
                             .matrix_count = distinct_channels(data_.patches.reflectance),
@@ -179,18 +175,6 @@ class LinkedOperator {
     settings.memory_limit_bytes =
         memory_of_matrix_free_transfer(build, decided_.memory_limit_bytes);
     settings.checkpoint = decided_.checkpoint;
-    return settings;
-  }
-
-  int planned_thread_count() const {
-    return plan_matrix_free_transfer(data_.patches.size(),
-                                     distinct_channels(data_.patches.reflectance),
-                                     operator_settings())
-        .thread_count;
-  }
-
-  void make_operator() {
-    const MatrixFreeTransferSettings settings = operator_settings();
     data_.transfer = clock_.run("operator", [&](const Progress& part) {
       const FittingLights lights = lights_.exitances.view();
       solved_.emplace(*data_.compressed_form_factors, data_.patches, lights, settings, part);

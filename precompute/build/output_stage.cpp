@@ -6,6 +6,7 @@
 #include "precompute/outputs/reconstruction_weights.h"
 #include "precompute/outputs/row_receivers.h"
 #include "precompute/outputs/surface_harmonics.h"
+#include "runtime/solvers/solve_radiosity.h"
 
 namespace rebounce {
 
@@ -46,9 +47,10 @@ void make_outputs(std::span<const std::uint32_t> shown_patch, const RayTracer& t
   }
 }
 
-void add_receiver_rows(std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
-                       const BuildSettings& settings, TransferData& data, BuildReport& report,
-                       PhaseClock& clock) {
+void make_outputs_of_operator(std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
+                              const BuildSettings& settings, TransferData& data,
+                              BuildReport& report, PhaseClock& clock) {
+  data.emitted_irradiance = irradiance_from_emitters(data);
   ReceiverRowSettings rows = settings.receiver_rows;
   if (rows.any() && !settings.receivers.empty()) {
     report.warnings.emplace_back(

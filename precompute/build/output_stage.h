@@ -22,10 +22,11 @@ void make_outputs(std::span<const std::uint32_t> shown_patch, const RayTracer& t
                   const BuildSettings& settings, TransferData& data, BuildReport& report,
                   PhaseClock& clock);
 
-/// Adds the rows of receivers that `settings` ask for to `data`, once it has its operator, and what
-/// vertices show without to `report`. Throws as make_receiver_rows does.
-void add_receiver_rows(std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
-                       const BuildSettings& settings, TransferData& data, BuildReport& report,
-                       PhaseClock& clock);
+/// Adds to `data` what needs its operator: the irradiance from emitters, and the rows of receivers
+/// that `settings` ask for; what vertices show without rows goes to `report`. Throws as
+/// irradiance_from_emitters and make_receiver_rows do.
+void make_outputs_of_operator(std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
+                              const BuildSettings& settings, TransferData& data,
+                              BuildReport& report, PhaseClock& clock);
 
 }  // namespace rebounce

@@ -54,6 +54,10 @@ TEST(BuildEstimate, TakesTheMemoryThatIsLeft) {
   const std::uint64_t free = peak_bytes_after_links(build, kPlenty),
                       least = peak_bytes_after_links(build, 1),
                       between = peak_bytes_after_links(build, (free + least) / 2);
+  EXPECT_EQ(thread_count_after_links(build, kPlenty), 8);
+  EXPECT_EQ(thread_count_after_links(build, 1), 1);
+  const int some = thread_count_after_links(build, (free + least) / 2);
+  EXPECT_TRUE(some > 1 && some < 8) << some;
   omp_set_num_threads(before);
   EXPECT_LT(least, between);
   EXPECT_LE(between, (free + least) / 2);

@@ -202,7 +202,9 @@ TEST(BuildFromLinks, TheFileIsTheSameForAnyThreadsAnyMemoryAndWithACheckpoint) {
   // Not enough for all threads.
   settings.memory_limit_bytes = least_memory(settings) * 3 / 2;
   settings.checkpoint = folder / "parts";
+  const int asked = omp_get_max_threads();
   const Built limited = build(kBareRoom, settings);
+  EXPECT_EQ(omp_get_max_threads(), asked);
   omp_set_num_threads(threads);
   EXPECT_LE(limited.report.estimate_after_links->peak_bytes, settings.memory_limit_bytes);
   save_transfer_file(folder / "other", limited.data);
