@@ -8,6 +8,7 @@
 #include "precompute/build/build_estimate.h"
 #include "precompute/build/operator_stage.h"
 #include "precompute/exchange/links/links.h"
+#include "precompute/exchange/pairs/form_factor_settings.h"
 #include "precompute/inverse/dense_transfer.h"
 #include "precompute/outputs/light_probes.h"
 #include "precompute/outputs/receiver_rows.h"
@@ -83,6 +84,7 @@ void check_settings(const BuildSettings& settings) {
   require(harmonic_rays == 0 || harmonic_rays >= kFewestHarmonicRays,
           "surface harmonics need at least 16 rays for each patch");
   check_receiver_rows(settings.receiver_rows);
+  check_form_factor_settings(settings.form_factors);
 }
 
 /// The settings with everything decided that was left open.

@@ -52,11 +52,6 @@ void make_outputs_of_operator(std::span<const std::uint32_t> shown_patch, const 
                               BuildReport& report, PhaseClock& clock) {
   data.emitted_irradiance = irradiance_from_emitters(data);
   ReceiverRowSettings rows = settings.receiver_rows;
-  if (rows.any() && !settings.receivers.empty()) {
-    report.warnings.emplace_back(
-        "vertices and texels with rows of their own see patches that are no receivers without "
-        "their indirect light");
-  }
   const auto make = [&](const char* phase, const RowReceivers& receivers) {
     return clock.run(phase, [&](const Progress& part) {
       return make_receiver_rows(data, shown_patch, receivers, tracer, rows,
@@ -71,6 +66,11 @@ void make_outputs_of_operator(std::span<const std::uint32_t> shown_patch, const 
   if (settings.receiver_rows.at_texels) {
     rows.least_error = 0;  // they were asked for
     data.texel_rows = make("rows of texels", TexelReceivers(data, shown_patch)).rows;
+  }
+  if (!settings.receivers.empty() && !(data.receiver_rows.empty() && data.texel_rows.empty())) {
+    report.warnings.emplace_back(
+        "vertices and texels with rows of their own see patches that are no receivers without "
+        "their indirect light");
   }
 }
 

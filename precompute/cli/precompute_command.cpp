@@ -199,12 +199,25 @@ std::uint64_t memory_limit_of(double gib) {
                                  static_cast<std::uint64_t>(gib * static_cast<double>(1ULL << 30)));
 }
 
-BuildSettings settings_of(const PrecomputeOptions& chosen) {
+/// The lamps of a light file as those of the scene; says what of it has no part in a build.
+std::vector<Light> own_lamps(const std::string& path, double scale, const CommonOptions& options) {
+  LightSetup setup = read_lights(path, scale);
+  if (setup.sky.luminance > 0 || !setup.emitters.empty()) {
+    print_note(options, "warning: " + path +
+                            ": sky and emitters are no lamps of the scene, and are left out");
+  }
+  if (setup.lights.empty()) {
+    print_note(options, "warning: " + path + ": there is no lamp; the scene has none");
+  }
+  return std::move(setup.lights);
+}
+
+BuildSettings settings_of(const PrecomputeOptions& chosen, const CommonOptions& options) {
   BuildSettings settings = chosen.settings;
   parse_probes(chosen.probes, settings.probes);
   settings.receivers = split_lists(chosen.receivers);
   settings.sources = split_lists(chosen.sources);
-  if (!chosen.lights.empty()) settings.lights = read_lights(chosen.lights, settings.scale).lights;
+  if (!chosen.lights.empty()) settings.lights = own_lamps(chosen.lights, settings.scale, options);
   if (chosen.form_factors == "pairs") settings.exchange_source = ExchangeSource::kPairs;
   if (chosen.form_factors == "links") settings.exchange_source = ExchangeSource::kLinks;
   settings.form_factors = with_quality(quality_named(chosen.quality), settings.form_factors);
@@ -218,7 +231,7 @@ BuildSettings settings_of(const PrecomputeOptions& chosen) {
 
 TransferData build(const PrecomputeOptions& chosen, const CommonOptions& options,
                    BuildReport& report) {
-  const BuildSettings settings = settings_of(chosen);
+  const BuildSettings settings = settings_of(chosen, options);
   check_can_write(chosen.output);
   if (chosen.reader == "web") check_can_write(form_factor_file_beside(chosen.output));
   ProgressBar bar(!options.quiet);
@@ -263,6 +276,17 @@ void run(const PrecomputeOptions& chosen, const CommonOptions& options) {
   }
   // The file is written all the same, and holds the measured errors.
   check_tolerances(data.record, report, data.compressed_form_factors != nullptr);
+}
+
+/// Throws Error if an option is given that the chosen kind of operator does not look at.
+void check_operator_options(const CLI::App& command, const PrecomputeOptions& chosen) {
+  const auto check = [&](const char* option, const std::string& kind) {
+    if (chosen.operator_kind == kind || command.count(option) == 0) return;
+    throw Error(fmt::format("{} has no part in a {} operator; leave it out, or give --operator {}",
+                            option, chosen.operator_kind, kind));
+  };
+  check("--tolerance", "hierarchical");
+  check("--rank", "low-rank");
 }
 
 // CLI11 keeps references to these values for as long as `command` lives, and so must `chosen` live.
@@ -447,7 +471,10 @@ void add_precompute_command(CLI::App& app, const CommonOptions& options) {
   command->add_option("--checkpoint", chosen->settings.checkpoint,
                       "Folder for links and finished parts of their operator: a run that was "
                       "killed continues when it is started again. Remove the folder afterwards");
-  command->callback([chosen, &options] { run(*chosen, options); });
+  command->callback([command, chosen, &options] {
+    check_operator_options(*command, *chosen);
+    run(*chosen, options);
+  });
 }
 
 }  // namespace rebounce::cli

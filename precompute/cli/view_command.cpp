@@ -201,7 +201,7 @@ void add_view_command(CLI::App& app, const CommonOptions& options) {
   command->add_option("file", chosen->file, "Transfer file")->required();
   command->add_option("--lights", chosen->lights,
                       "Lights: .json, or a .glb that has some; by default those of the scene, or "
-                      "one lamp if it has none");
+                      "one lamp if nothing in it shines");
   command->add_option("--camera", chosen->camera, fmt::format("First camera. {}", kCameraHelp));
   command->add_option("--size", chosen->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
   command->add_option("--show", chosen->show, "First view: as for render")

@@ -107,6 +107,7 @@ void run(const ViewFactorOptions& chosen, const CommonOptions& options) {
   const Facets facets = read_facets(chosen.geometry);
   const std::vector<double> emissivity =
       chosen.exchange ? emissivities(chosen, facets) : std::vector<double>();
+  if (chosen.exchange) check_exchange(facets.size(), emissivity);  // before the long part
   ViewFactors factors;
   std::optional<ExchangeFactors> exchange;
   {
@@ -201,12 +202,15 @@ void add_view_factors_command(CLI::App& app, const CommonOptions& options) {
                    "Leave out pairs both of whose factors are below this, as long as no row loses "
                    "more than 5e-4; by default 1e-6 for u-DALES and 0 for other formats")
       ->check(CLI::Range(0.0, 1.0));
-  command->add_flag("--exchange", chosen->exchange,
-                    "Exchange (Gebhart) factors too, as exchange_factor in a .npz: the part of "
-                    "what a facet emits that another absorbs after all reflections");
-  command->add_option("--emissivity", chosen->emissivity,
-                      "For --exchange: a number, or a text file with one for each facet; by "
-                      "default those of a .vs3 file");
+  CLI::Option* exchange =
+      command->add_flag("--exchange", chosen->exchange,
+                        "Exchange (Gebhart) factors too, as exchange_factor in a .npz: the part of "
+                        "what a facet emits that another absorbs after all reflections");
+  command
+      ->add_option("--emissivity", chosen->emissivity,
+                   "For --exchange: a number, or a text file with one for each facet; by "
+                   "default those of a .vs3 file")
+      ->needs(exchange);
   command->add_option("--seed", chosen->seed, "Seed of the sample points")->capture_default_str();
   command->callback([chosen, &options] { run(*chosen, options); });
 }

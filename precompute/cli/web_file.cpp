@@ -6,7 +6,6 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
@@ -27,43 +26,56 @@ void shorten(float& value) {
   value = std::bit_cast<float>((std::bit_cast<std::uint32_t>(value) + half) & kept);
 }
 
-std::vector<std::byte> gzip(std::span<const std::byte> bytes) {
-  constexpr int kGzipWindow = 15 + 16;  // 16: with the header of gzip
-  z_stream stream{};
-  if (deflateInit2(&stream, Z_BEST_COMPRESSION, Z_DEFLATED, kGzipWindow, 9, Z_DEFAULT_STRATEGY) !=
-      Z_OK) {
-    throw Error("out of memory while a file is packed");
+/// A file that is packed with gzip as it is written.
+class PackedFile {
+ public:
+  explicit PackedFile(const std::filesystem::path& path) : file_(path), packed_(kPiece) {
+    constexpr int kGzipWindow = 15 + 16;  // 16: with the header of gzip
+    if (deflateInit2(&stream_, Z_BEST_COMPRESSION, Z_DEFLATED, kGzipWindow, 9,
+                     Z_DEFAULT_STRATEGY) != Z_OK) {
+      throw Error("out of memory while a file is packed");
+    }
   }
-  const std::uint64_t most = deflateBound(&stream, bytes.size());
-  if (std::max<std::uint64_t>(most, bytes.size()) > std::numeric_limits<uInt>::max()) {
-    deflateEnd(&stream);
-    throw Error("a file of more than 4 GiB cannot be packed; ask for fewer patches");
-  }
-  std::vector<std::byte> packed(most);
-  // It only reads there.
-  stream.next_in = const_cast<Bytef*>(reinterpret_cast<const Bytef*>(bytes.data()));
-  stream.avail_in = static_cast<uInt>(bytes.size());
-  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-  stream.avail_out = static_cast<uInt>(packed.size());
-  const int result = deflate(&stream, Z_FINISH);
-  packed.resize(stream.total_out);
-  deflateEnd(&stream);
-  if (result != Z_STREAM_END) throw Error("a file could not be packed");
-  return packed;
-}
+  ~PackedFile() { deflateEnd(&stream_); }
+  PackedFile(const PackedFile&) = delete;
+  PackedFile& operator=(const PackedFile&) = delete;
 
-/// Packs what `write` gives to a sink.
-std::uint64_t save_packed(const std::filesystem::path& path, const auto& write) {
-  std::vector<std::byte> bytes;
-  write([&](std::span<const std::byte> piece) {
-    bytes.insert(bytes.end(), piece.begin(), piece.end());
-  });
-  const std::vector<std::byte> packed = gzip(bytes);
-  AtomicFile file(path);
-  file.write(packed);
-  file.commit();
-  return packed.size();
-}
+  void add(std::span<const std::byte> bytes) {
+    for (; !bytes.empty(); bytes = bytes.subspan(std::min(kPiece, bytes.size()))) {
+      pack(bytes.first(std::min(kPiece, bytes.size())), Z_NO_FLUSH);
+    }
+  }
+
+  /// Writes what is left. Do so with all files that belong together before one is committed.
+  void finish() { pack({}, Z_FINISH); }
+
+  /// After finish().
+  void commit() { file_.commit(); }
+
+  std::uint64_t size() const { return size_; }
+
+ private:
+  static constexpr std::size_t kPiece = 1 << 20;  // of what zlib is given at once
+
+  void pack(std::span<const std::byte> bytes, int flush) {
+    // It only reads there.
+    stream_.next_in = const_cast<Bytef*>(reinterpret_cast<const Bytef*>(bytes.data()));
+    stream_.avail_in = static_cast<uInt>(bytes.size());
+    do {
+      stream_.next_out = reinterpret_cast<Bytef*>(packed_.data());
+      stream_.avail_out = static_cast<uInt>(packed_.size());
+      if (deflate(&stream_, flush) == Z_STREAM_ERROR) throw Error("a file could not be packed");
+      const std::span made = std::span(packed_).first(packed_.size() - stream_.avail_out);
+      file_.write(made);
+      size_ += made.size();
+    } while (stream_.avail_out == 0);
+  }
+
+  AtomicFile file_;
+  std::vector<std::byte> packed_;
+  z_stream stream_{};
+  std::uint64_t size_ = 0;
+};
 
 }  // namespace
 
@@ -82,14 +94,26 @@ std::uint64_t save_web_files(const std::filesystem::path& path, TransferData dat
   for (Harmonics& weights : data.probes.entry_weight) {
     for (float& weight : weights) shorten(weight);
   }
-  std::uint64_t size =
-      save_packed(path, [&](const ByteSink& sink) { write_transfer_file(sink, data); });
-  if (form_factors != nullptr) {
-    data.compressed_form_factors = form_factors;
-    size += save_packed(form_factor_file_beside(path),
-                        [&](const ByteSink& sink) { write_form_factor_file(sink, data); });
+  PackedFile file(path);
+  const auto sink_of = [](PackedFile& to) {
+    return [&to](std::span<const std::byte> piece) { to.add(piece); };
+  };
+  write_transfer_file(sink_of(file), data);
+  file.finish();
+  const std::filesystem::path beside = form_factor_file_beside(path);
+  if (form_factors == nullptr) {
+    file.commit();
+    std::error_code none;  // it belongs to a file that has been replaced, if it is there
+    std::filesystem::remove(beside, none);
+    return file.size();
   }
-  return size;
+  data.compressed_form_factors = form_factors;
+  PackedFile second(beside);
+  write_form_factor_file(sink_of(second), data);
+  second.finish();
+  file.commit();
+  second.commit();
+  return file.size() + second.size();
 }
 
 }  // namespace rebounce::cli

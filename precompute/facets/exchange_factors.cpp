@@ -1,11 +1,14 @@
 #include "precompute/facets/exchange_factors.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <string>
 
 #include "precompute/inverse/dense_transfer.h"
 #include "rebounce/error.h"
+#include "transfer/base/machine_memory.h"
 
 namespace rebounce {
 namespace {
@@ -15,6 +18,9 @@ constexpr double kLeastEmissivity = 0.01;
 
 // Factors of other programs come in few digits: six after the point, or four that count.
 constexpr double kFactorRounding = 1e-6, kRelativeRounding = 1e-3;
+
+// What rows of such factors, or of those that were found apart, may add up to above 1.
+constexpr double kMostOverOne = 0.02;
 
 /// F(i, j); 0 if it is not stored.
 double factor_of(const ViewFactors& factors, std::size_t i, std::uint32_t j) {
@@ -30,8 +36,8 @@ double factor_of(const ViewFactors& factors, std::size_t i, std::uint32_t j) {
               std::to_string(j + 1) + " " + why);
 }
 
-/// Throws Error unless areas are above 0, factors at least 0, and the two factors of a pair say the
-/// same: only one of them is used.
+/// Throws Error unless areas are above 0, factors and skies in [0, 1], rows with their sky at most
+/// 1, and the two factors of a pair say the same: only one of them is used.
 void check_factors(const ViewFactors& factors) {
   const std::vector<double>& area = factors.area;
   for (std::size_t i = 0; i < factors.size(); ++i) {
@@ -40,6 +46,9 @@ void check_factors(const ViewFactors& factors) {
     }
   }
   for (std::uint32_t i = 0; i < factors.size(); ++i) {
+    double sum = factors.sky[i];
+    if (!(sum >= 0))
+      throw Error("the sky of facet " + std::to_string(i + 1) + " is not a number from 0 on");
     for (std::uint64_t k = factors.row_begin[i]; k < factors.row_begin[i + 1]; ++k) {
       const std::uint32_t j = factors.column[k];
       const double there = area[i] * factors.factor[k], back = area[j] * factor_of(factors, j, i);
@@ -48,6 +57,11 @@ void check_factors(const ViewFactors& factors) {
                                        kFactorRounding * std::max(area[i], area[j])) {
         refuse_factor(i, j, "and the one back differ: times area they must be the same");
       }
+      sum += factors.factor[k];
+    }
+    if (!(sum <= 1 + kMostOverOne)) {
+      throw Error(fmt::format("the view factors and the sky of facet {} add up to {:.4g}, above 1",
+                              i + 1, sum));
     }
   }
 }
@@ -80,10 +94,7 @@ PatchTable patches_of(const ViewFactors& factors, std::span<const double> emissi
 
 }  // namespace
 
-ExchangeFactors compute_exchange_factors(const ViewFactors& factors,
-                                         std::span<const double> emissivity,
-                                         const Progress& progress) {
-  const std::size_t n = factors.size();
+void check_exchange(std::size_t n, std::span<const double> emissivity) {
   if (emissivity.size() != n) {
     throw Error("there are " + std::to_string(emissivity.size()) + " emissivities for " +
                 std::to_string(n) + " facets; give one number, or one for each facet");
@@ -92,6 +103,22 @@ ExchangeFactors compute_exchange_factors(const ViewFactors& factors,
     if (emissivity[i] >= kLeastEmissivity && emissivity[i] <= 1) continue;
     throw Error("the emissivity of facet " + std::to_string(i + 1) + " is not in [0.01, 1]");
   }
+  const std::uint64_t needed =
+      dense_transfer_peak_bytes(n, 1, Arithmetic::kDouble) + std::uint64_t{n} * n * sizeof(float);
+  if (needed > machine_memory_bytes()) {
+    constexpr double kGiB = 1ULL << 30;
+    throw Error(fmt::format(
+        "exchange factors of {} facets need {:.3g} GiB, this machine has {:.3g}; take view factors "
+        "alone, or fewer facets",
+        n, static_cast<double>(needed) / kGiB, static_cast<double>(machine_memory_bytes()) / kGiB));
+  }
+}
+
+ExchangeFactors compute_exchange_factors(const ViewFactors& factors,
+                                         std::span<const double> emissivity,
+                                         const Progress& progress) {
+  const std::size_t n = factors.size();
+  check_exchange(n, emissivity);
   check_factors(factors);
   const auto transfer = build_dense_transfer(exchange_of(factors), patches_of(factors, emissivity),
                                              Precision::kF32, progress);

@@ -18,7 +18,12 @@ struct ExchangeFactors {
   std::vector<double> sky;    ///< [n] fraction that leaves in the end
 };
 
-/// `emissivity` [n] in [0.01, 1]. Throws Error if its size is wrong, a number is out of range, or
+/// Throws Error if exchange factors cannot be computed for `n` facets: the number of emissivities
+/// is another, one is not in [0.01, 1], or the factors and the dense inverse do not fit into the
+/// memory of this machine.
+void check_exchange(std::size_t n, std::span<const double> emissivity);
+
+/// `emissivity` [n]. Throws Error as check_exchange does, and if
 /// area(i) F(i, j) = area(j) F(j, i) does not hold to four digits; Cancelled if asked to stop. Time
 /// grows with n³, memory with n².
 ExchangeFactors compute_exchange_factors(const ViewFactors& factors,

@@ -27,20 +27,26 @@ class FacetText {
     if (text_.size() >= kTextBlock) flush();
   }
 
-  void commit() {
-    flush();
-    file_.commit();
-  }
-
- private:
+  /// Writes what is left. Do so with all files that belong together before one is committed.
   void flush() {
     file_.write(std::as_bytes(std::span(text_.data(), text_.size())));
     text_.clear();
   }
 
+  /// After flush().
+  void commit() { file_.commit(); }
+
+ private:
   AtomicFile file_;
   fmt::memory_buffer text_;
 };
+
+void commit_both(FacetText& matrix, FacetText& sky) {
+  matrix.flush();
+  sky.flush();
+  matrix.commit();
+  sky.commit();
+}
 
 /// A line "i j F" for each factor, numbered from 1. Nine digits give every factor back to 1e-9 of
 /// itself: reciprocity survives, and small factors do too.
@@ -92,8 +98,7 @@ void write_matrix_market(const std::filesystem::path& path, const ViewFactors& f
   add_triplets(factors, matrix);
   sky.add("%%MatrixMarket matrix array real general\n{} 1\n", factors.size());
   for (const double part : factors.sky) sky.add("{:.9g}\n", part);
-  matrix.commit();
-  sky.commit();
+  commit_both(matrix, sky);
 }
 
 void write_u_dales(const std::filesystem::path& folder, const std::string& case_number,
@@ -106,8 +111,7 @@ void write_u_dales(const std::filesystem::path& folder, const std::string& case_
   FacetText sky(folder / ("svf.inp." + case_number));
   sky.add("# sky view factors\n");
   for (const double part : factors.sky) sky.add("{:.8f}\n", part);
-  matrix.commit();
-  sky.commit();
+  commit_both(matrix, sky);
 }
 
 }  // namespace rebounce

@@ -50,6 +50,7 @@ struct Scene {
   std::vector<Camera> cameras;
 
   std::string name;  ///< file name without its folder
+  double scale = 1;  ///< metres in one unit of the file
   std::string hash;  ///< "xxh3:" + 32 hexadecimal digits over the file, its buffers and images
   std::size_t degenerate_triangle_count = 0;  ///< triangles without area, dropped
   std::vector<std::string> warnings;          ///< one line each

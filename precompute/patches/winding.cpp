@@ -257,6 +257,7 @@ void make_double_sided(Scene& scene, std::span<const InsideOutPiece> pieces) {
 
 Scene import_usable(const std::filesystem::path& path, double scale) {
   Scene scene = import_gltf(path, scale);
+  scene.scale = scale;
   make_double_sided(scene, find_inside_out(scene));
   return scene;
 }

@@ -41,6 +41,7 @@ export function serve(folder, port = 0) {
       if (response.headersSent) response.destroy();
       else refuse(403, 'The file cannot be read.');
     });
+    response.on('close', () => stream.destroy());  // whoever asked may have gone
     stream.pipe(response);
   });
   return new Promise((resolve, reject) => {

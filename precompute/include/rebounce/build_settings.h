@@ -21,7 +21,8 @@ struct SubdivisionSettings {
   /// Wanted number of patches; 0: patch_size decides. More patches resolve finer light; from pairs
   /// offline memory grows with their square, and time faster.
   std::size_t patch_count = 4096;
-  /// The largest length of a patch, metres, >= 0; 0: no limit. With patch_count both hold.
+  /// The largest length of a patch, metres, >= 0; 0: no limit. With patch_count, what is reached
+  /// first ends the subdivision.
   float patch_size = 0;
   /// How much finer patches are where the direct light of the scene's own lamps and emitters
   /// varies: a difference of its root mean square over the scene counts like this number of mean
@@ -185,7 +186,7 @@ struct BuildSettings {
   /// Error of F B, relative and area-weighted L2, in the mean, at which the form factors are
   /// compressed and kept, for the same uses. A smaller error takes more bytes. 0: they are not
   /// kept; where the operator is made from them (kLinks), they have a fifth of its tolerance, or
-  /// less where little light reaches the receivers.
+  /// less where little light reaches the receivers. Without an operator there are none.
   double form_factor_tolerance = 0;
   /// Whose indirect light is wanted, and what lamps shine on: names of meshes and materials
   /// (mesh:NAME or material:NAME for one kind) and boxes in metres, box:X0,Y0,Z0,X1,Y1,Z1, or none

@@ -5,6 +5,8 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
+#include <algorithm>
+#include <cmath>
 #include <span>
 #include <string>
 #include <vector>
@@ -18,6 +20,14 @@ namespace py = pybind11;
 /// C-contiguous, converted if it is not.
 template <typename T>
 using Array = py::array_t<T, py::array::c_style | py::array::forcecast>;
+
+/// Throws ValueError unless all `values` are finite: integers that light is rounded to in a product
+/// have no number for what is not.
+template <typename Number>
+void check_finite(std::span<const Number> values, const char* name) {
+  if (std::ranges::all_of(values, [](Number x) { return std::isfinite(x); })) return;
+  throw py::value_error(std::string(name) + " has a number that is not finite");
+}
 
 /// Throws ValueError unless the shape is `shape`; -1 fits any.
 inline void check_shape(const py::array& array, const std::vector<py::ssize_t>& shape,

@@ -58,6 +58,7 @@ py::array gather_with(const FormFactors& factors, const Array<Number>& light, bo
   check_shape(light, {static_cast<py::ssize_t>(factors.size()), -1}, "light");
   py::array_t<Number> result({light.shape(0), light.shape(1)});
   const Number* in = light.data();
+  check_finite(std::span(in, static_cast<std::size_t>(light.size())), "light");
   Number* out = result.mutable_data();
   const auto columns = static_cast<std::size_t>(light.shape(1));
   const py::gil_scoped_release unlocked;

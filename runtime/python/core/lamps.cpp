@@ -68,8 +68,8 @@ Light light_from(const py::handle& fields) {
   return light;
 }
 
-py::tuple read_light_file(const std::filesystem::path& path) {
-  const LightSetup setup = read_lights(path);
+py::tuple read_light_file(const std::filesystem::path& path, double scale) {
+  const LightSetup setup = read_lights(path, scale);
   py::dict emitters;
   for (const EmitterScale& emitter : setup.emitters) {
     emitters[py::str(emitter.material)] = emitter.scale;
@@ -102,7 +102,7 @@ void add_lamps(py::module_& module) {
       .def("intensity", &Profile::intensity, py::arg("vertical_angle"),
            py::arg("horizontal_angle") = 0.0F);
   module.def("parse_profile", &parse_profile, py::arg("text"), py::arg("name"));
-  module.def("read_lights", &read_light_file, py::arg("path"));
+  module.def("read_lights", &read_light_file, py::arg("path"), py::arg("scale"));
 }
 
 std::vector<Light> lights_from(const py::sequence& lights) {

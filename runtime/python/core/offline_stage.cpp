@@ -118,7 +118,8 @@ py::dict arrays_of_scene(const py::object& self) {
 
 /// Runs the offline stage. Returns the data and the warnings.
 py::tuple build(const Scene& scene, const py::dict& options, const py::object& progress) {
-  const BuildSettings settings = settings_of(options);
+  BuildSettings settings = settings_of(options);
+  settings.scale = scene.scale;
   BuildReport report;
   LongWork work(progress);
   auto data = work.run([&] {

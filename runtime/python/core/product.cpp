@@ -248,6 +248,7 @@ py::array apply_to(const Data& data, const py::array_t<Number>& light, bool adjo
   }
   auto result = array_like<Number>(light);
   const Number* const in = light.data();
+  check_finite(std::span(in, static_cast<std::size_t>(light.size())), "light");
   Number* const out = result.mutable_data();
   const auto columns = static_cast<std::size_t>(light.ndim() == 1 ? 1 : light.shape(1));
   const py::gil_scoped_release unlocked;

@@ -70,6 +70,7 @@ class Profile:
 def parse_profile(text: str, name: str) -> Profile: ...
 def read_lights(
     path: str,
+    scale: float,
 ) -> Tuple[
     List[Dict[str, Any]], float, Sequence[float], Optional[_Floats], Dict[str, Sequence[float]]
 ]: ...

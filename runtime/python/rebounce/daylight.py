@@ -201,7 +201,7 @@ def perez_sky(
     Returns the mean luminance of the cells, [h, 146] in cd/m² (cell 0: ground of this reflectance
     under sun and sky), and the illuminance of the sun on a surface that faces it, [h] in lx. Hours
     with the sun less than a degree above the horizon, or without diffuse irradiance, are dark.
-    Raises ValueError if the shapes do not fit each other.
+    Raises ValueError if the shapes do not fit each other, or a number is out of range.
 
     >>> cells, sun = perez_sky([[0, 1, 0]], [0.0], [100.0])
     >>> cells.shape, float(sun[0])
@@ -215,6 +215,10 @@ def perez_sky(
             f"to_sun, direct_normal and diffuse_horizontal have the shapes {list(sun.shape)}, "
             f"{list(beam.shape)} and {list(diffuse.shape)}, and need [h, 3], [h] and [h]"
         )
+    if not 0 <= ground_reflectance <= 1:
+        raise ValueError(f"ground_reflectance is {ground_reflectance}; it must be in [0, 1]")
+    if not (np.all(beam >= 0) and np.all(diffuse >= 0)):
+        raise ValueError("direct_normal and diffuse_horizontal must be at least 0")
     altitude = np.arcsin(np.clip(sun[:, 1], -1, 1))
     lit = (altitude > _LOWEST_SUN) & (diffuse > 0)
     zenith = np.pi / 2 - np.maximum(altitude, _LOWEST_SUN)
@@ -306,7 +310,7 @@ def simulate_year(
     patches goes to the sensors `batch` hours at a time. Lamps, and surfaces that emit, are evaluated
     once, beside: they are dark in the hours.
     ground_reflectance: in [0, 1], of the ground below the horizon. points_per_patch: as of Engine.
-    progress: see precompute. Raises Error if the data have no sky cells, because the scene is
+    progress: see precompute. Raises ValueError if ground_reflectance is out of range, Error if the data have no sky cells, because the scene is
     closed, or a lamp is out of range.
     """
     to_sun = sun_position(weather)

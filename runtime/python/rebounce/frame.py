@@ -89,20 +89,23 @@ def load_profile(path: Union[str, "os.PathLike[str]"]) -> "_core.Profile":
         return _core.parse_profile(file.read(), os.fspath(path))
 
 
-def load_lights(path: Union[str, "os.PathLike[str]"]) -> Tuple[List[Light], Sky]:
+def load_lights(path: Union[str, "os.PathLike[str]"], scale: float = 1.0) -> Tuple[List[Light], Sky]:
     """The lamps and the sky of a light file (.json), or the lamps of a .glb or .gltf.
 
-    It takes what `rebounce solve --lights` takes: profiles of luminaires and CIE skies too. Raises
-    Error with the light and the field if one is wrong.
+    It takes what `rebounce solve --lights` takes: profiles of luminaires and CIE skies too. `scale`
+    is the length of the unit of a .glb or .gltf in metres, above 0, as in load_scene; a .json file
+    is in metres. Raises Error with the light and the field if one is wrong.
     """
-    lights, luminance, color, cells, _ = _core.read_lights(os.fspath(path))
+    if not (scale > 0 and math.isfinite(scale)):
+        raise ValueError(f"scale is {scale}; it must be above 0")
+    lights, luminance, color, cells, _ = _core.read_lights(os.fspath(path), scale)
     return [Light(**fields) for fields in lights], Sky(luminance, color, cells)
 
 
 def load_emitters(path: Union[str, "os.PathLike[str]"]) -> Dict[str, Triple]:
     """What a light file says of surfaces that emit: factors [3] for Engine.set_emission_scale, by
     the name of the material. Raises Error as load_lights does."""
-    return dict(_core.read_lights(os.fspath(path))[4])
+    return dict(_core.read_lights(os.fspath(path), 1.0)[4])
 
 
 class Engine:

@@ -64,7 +64,8 @@ class TransferOperator(ProductOperator):
     Shape [3n, 3n], channel by channel: entry c n + i is channel c of patch i. `op @ x` for x [3n] or
     [3n, k]; float32 stays float32. Columns (hours, lamps) go through together, without copies of x
     where they lie one after the other in memory (order="F"); the result lies as x does.
-    `op.H` is the adjoint, A Y A^-1 with the areas A. `op.channel(c)` is one channel, [n, n].
+    `op.H` is the adjoint, A Y A^-1 with the areas A. `op.channel(c)` is one channel, [n, n]. Products
+    raise ValueError if x has a number that is not finite.
     """
 
     def __init__(self, data: "TransferData", dtype: npt.DTypeLike = np.float32) -> None:
@@ -104,7 +105,8 @@ class ChannelOperator(ProductOperator):
 class FormFactorOperator(LinearOperator):  # type: ignore[misc]
     """F of shape [n, n]: F[i, j] is the fraction of the light of patch i that arrives at patch j.
 
-    Raises Error where the data keep no form factors; see precompute(form_factors=...).
+    Raises Error where the data keep no form factors; see precompute(form_factors=...). Products raise
+    ValueError if x has a number that is not finite.
     """
 
     def __init__(self, data: "TransferData", dtype: npt.DTypeLike = np.float32) -> None:

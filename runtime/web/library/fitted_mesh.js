@@ -93,13 +93,13 @@ export class SurfaceFitter {
     const { geometry, matrixWorld } = mesh;
     const { index } = geometry;
     const place = geometry.attributes.position;
-    const materials = [mesh.material].flat();
     const mirrored = matrixWorld.determinant() < 0;
     const groups = geometry.groups.length > 0
         ? geometry.groups : [{ start: 0, count: (index ?? place).count, materialIndex: 0 }];
     const made = new Pieces(geometry, this.#surface, matrixWorld);
     for (const { start, count, materialIndex } of groups) {
-      const bothSides = materials[materialIndex]?.side === THREE.DoubleSide;
+      const material = Array.isArray(mesh.material) ? mesh.material[materialIndex] : mesh.material;
+      const bothSides = material?.side === THREE.DoubleSide;
       made.beginGroup(materialIndex);
       const end = Math.min(start + count, (index ?? place).count);
       for (let k = start; k + 3 <= end; k += 3) {

@@ -400,6 +400,11 @@ export class Solver {
   /** How far other indirect light of the patches, [n][3], is from what has converged, relative. */
   errorOf(irradiance) {
     const address = this.#living();
+    if (irradiance.length !== 3 * this.patchCount) {
+      throw new RebounceError(
+          `errorOf: irradiance has ${irradiance.length} numbers; give three for each of the ` +
+          `${this.patchCount} patches`);
+    }
     this.#instance.floats(this.#patches, 3 * this.patchCount).set(irradiance);
     this.#instance.check('rebounce_web_solver_error', address, this.#patches, this.#result);
     return this.#instance.doubles(this.#result, 1)[0];

@@ -35,6 +35,8 @@ TEST(BuildSettings, OutOfRangeAreRefused) {
       {"spacing of probes", [](BuildSettings& s) { s.probes.spacing = -1; }},
       {"a probe needs at least 64 rays", [](BuildSettings& s) { s.probes.ray_count = 63; }},
       {"at least 16 rays", [](BuildSettings& s) { s.surface_harmonics.ray_count = 3; }},
+      {"rays per pair must be between", [](BuildSettings& s) { s.form_factors.full_rays = 512; }},
+      {"rays per pair must be between", [](BuildSettings& s) { s.form_factors.probe_rays = 0; }},
       {"ray_count must be at least 64", [](BuildSettings& s) { s.receiver_rows.ray_count = 1; }},
   };
   EXPECT_NO_THROW(check_settings({}));

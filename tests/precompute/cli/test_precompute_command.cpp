@@ -6,6 +6,7 @@
 #include <csignal>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -442,6 +443,27 @@ TEST_F(PrecomputeCommand, RefusesReceiversAndSourcesThatAreNotThere) {
   attempt({"--receivers", "floor", "--operator", "low-rank"}, "hierarchical operators alone");
 }
 
+TEST_F(PrecomputeCommand, RefusesWhatTheOperatorDoesNotLookAt) {
+  const auto attempt = [&](const Words& options, const std::string& part) {
+    Words words = {"precompute", kScene, "-o", path("x.safetensors")};
+    words.insert(words.end(), options.begin(), options.end());
+    expect_refused(words, part);
+  };
+  attempt({"--rank", "64"}, "--rank has no part in a hierarchical operator");
+  attempt({"--operator", "dense", "--tolerance", "0.01"}, "--tolerance has no part in a dense");
+  attempt({"--operator", "low-rank", "--tolerance", "0.01"}, "give --operator hierarchical");
+}
+
+TEST_F(PrecomputeCommand, SaysWhatOfALightFileHasNoPartInABuild) {
+  const std::string lights = path("lights.json");
+  std::ofstream(lights) << R"({"sky": {"luminance": 100}, "lights": []})";
+  const auto outcome = run(test::quick(
+      {"precompute", kScene, "--patches", "60", "--lights", lights, "-o", path("x.safetensors")}));
+  EXPECT_EQ(outcome.exit_code, test::kDone) << outcome.err;
+  EXPECT_NE(outcome.err.find("sky and emitters are no lamps"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("there is no lamp"), std::string::npos) << outcome.err;
+}
+
 TEST_F(PrecomputeCommand, WritesForPagesPackedFilesAndFormFactorsApart) {
   const std::string whole = precompute("whole.safetensors", {"--compress-form-factors", "0.01"});
   const std::string page =
@@ -452,6 +474,8 @@ TEST_F(PrecomputeCommand, WritesForPagesPackedFilesAndFormFactorsApart) {
     EXPECT_EQ(file.substr(0, 2), "\x1f\x8b");
   }
   EXPECT_LT(packed.size() + apart.size(), test::read_bytes(whole).size() * 3 / 4);
+  precompute("page.safetensors", {"--for", "web"});  // whose second file would be of another build
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "page.form_factors.safetensors"));
   for (const Words& option : {Words{"--lightmap", "64"}, Words{"--store-form-factors"}}) {
     Words words = {"precompute", kScene, "-o", path("x.safetensors"), "--for", "web"};
     words.insert(words.end(), option.begin(), option.end());

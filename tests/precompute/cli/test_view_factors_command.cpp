@@ -146,6 +146,16 @@ TEST_F(ViewFactorsCommand, AddsExchangeFactorsOfAnEnclosure) {
   expect_refused(
       {"view-factors", write("squares.obj", kSquares), "-o", path("g.npz"), "--exchange"},
       "--exchange needs --emissivity");
+  const std::string of_two = write("emissivity.txt", "0.5 0.6");
+  for (const auto& [emissivity, part] :
+       {std::pair<std::string, std::string>{"0.005", "facet 1 is not in"},
+        {of_two, "there are 2 emissivities for 6 facets"}}) {
+    expect_refused({"view-factors", cube, "-o", path("g.npz"), "--closed", "--exchange",
+                    "--emissivity", emissivity},
+                   part);
+  }
+  expect_failure({"view-factors", cube, "-o", path("g.npz"), "--emissivity", "0.5"},
+                 "--emissivity requires --exchange", test::kUsage);
 }
 
 TEST_F(ViewFactorsCommand, RefusesInOneLine) {

@@ -96,6 +96,11 @@ def test_perez_sky_gives_the_diffuse_illuminance():
     assert clear[0].argmax() == near_sun
     # Thickly overcast: as the CIE overcast sky brighter above, without a sun.
     assert 1.4 < overcast[0, 145] / overcast[0, 1:31].mean() < 4
+    for wrong in (20, -0.1, float("nan")):
+        with pytest.raises(ValueError, match="ground_reflectance is"):
+            daylight.perez_sky(sun, [0], [150], ground_reflectance=wrong)
+    with pytest.raises(ValueError, match="must be at least 0"):
+        daylight.perez_sky(sun, [-1], [150])
     night, dark = daylight.perez_sky([[0, -1, 0]], [0], [0])
     assert not night.any() and not dark.any()
     with pytest.raises(ValueError, match="shapes"):

@@ -100,6 +100,14 @@ def test_wrong_facets_are_refused():
         rebounce.view_factors(vertices, [[0, 1, 2]], closed=True)
     with pytest.raises(ValueError, match=r"F has the shape \[2, 3\], and needs \[2, 2\]"):
         rebounce.exchange_factors(np.ones((2, 3)), 0.0, 1.0, 0.5)
+    for F, sky, match in (
+        ([[0, 1.5], [1.5, 0]], 0.0, "add up to 1.5, above 1"),
+        ([[0, 0.5], [0.5, 0]], 0.6, "add up to 1.1, above 1"),
+        ([[0, 0.5], [0.5, 0]], np.nan, "sky of facet 1 is not"),
+        ([[0, 0.5], [0.5, 0]], -0.1, "sky of facet 1 is not"),
+    ):
+        with pytest.raises(rebounce.Error, match=match):
+            rebounce.exchange_factors(F, sky, 1.0, 0.5)
 
 
 def test_files_of_facets(tmp_path):

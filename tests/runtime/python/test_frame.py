@@ -1,5 +1,7 @@
 """Engines, lamps, skies, solutions, sensors."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -128,6 +130,24 @@ def test_profiles_and_skies_of_a_light_file(tmp_path):
     path.write_text('{"lights": [{"colour": [1, 1, 1]}]}')
     with pytest.raises(rebounce.Error, match="colour"):
         rebounce.load_lights(path)
+    with pytest.raises(ValueError, match="scale is 0"):
+        rebounce.load_lights(path, scale=0)
+
+
+def test_the_scale_of_a_scene_holds_for_its_lamps(tmp_path):
+    scene = json.loads((ROOT / "tests/scenes/cornell_box.gltf").read_text())
+    light = {"type": "point", "intensity": 5.0}
+    scene["extensions"] = {"KHR_lights_punctual": {"lights": [light]}}
+    scene["extensionsUsed"] = [*scene.get("extensionsUsed", []), "KHR_lights_punctual"]
+    scene["nodes"].append({"translation": [0.2, 0.3, 0.2], "extensions": {"KHR_lights_punctual": {"light": 0}}})
+    scene["scenes"][scene.get("scene", 0)]["nodes"].append(len(scene["nodes"]) - 1)
+    path = tmp_path / "lamp.gltf"
+    path.write_text(json.dumps(scene))
+    read = rebounce.load_scene(path, scale=2.0)
+    assert rebounce.load_lights(path, scale=2.0)[0][0].position == pytest.approx(read.lights[0].position)
+    assert rebounce.load_lights(path)[0][0].position == pytest.approx([0.2, 0.3, 0.2])
+    data = rebounce.precompute(read, patches=60, quality="low")
+    assert data.record["settings"]["scale"] == 2.0
 
 
 def test_profiles_shine_as_spots_do(small_room, tmp_path):

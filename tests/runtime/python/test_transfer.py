@@ -181,6 +181,11 @@ def test_products_of_every_layout(cornell):
     for op in (whole, whole.H, whole.channel(0), cornell.form_factors, cornell.form_factors.H):
         with pytest.raises(ValueError, match="light must be real, not complex"):
             op @ np.full(op.shape[1], 1 + 1j)
+        for dtype in (np.float32, np.float64):
+            light = np.ones(op.shape[1], dtype)
+            light[5] = np.nan
+            with pytest.raises(ValueError, match="light has a number that is not finite"):
+                op @ light
 
 
 def test_operators_work_in_solvers(small_room):

@@ -110,6 +110,7 @@ test('Gauss-Seidel converges to the light of the engine, and follows it from fra
   assert.ok(first.error > 0.05 && second.error < 0.7 * first.error, `${first.error}, ${second.error}`);
   assert.ok(engineError < 0.01, `${engineError}`);
   assert.equal(solver.errorOf(engine.indirectIrradiance()), engineError);
+  assert.throws(() => solver.errorOf(engine.indirectIrradiance().subarray(0, 30)), /30 numbers/);
   solver.sweep(engine, 100);
   const [swept, ours] =
       [solver.vertexIrradiance().slice(), engine.vertexIrradiance()];
