@@ -3,17 +3,23 @@
 #include <algorithm>
 #include <bit>
 #include <cstdint>
+#include <limits>
 #include <span>
+#include <type_traits>
 
 namespace rebounce {
 
-/// True if no value is infinite or NaN.
-inline bool are_finite(std::span<const float> values) {
-  std::uint32_t largest = 0;
-  for (const float value : values) {
-    largest = std::max(largest, std::bit_cast<std::uint32_t>(value) & 0x7FFFFFFFU);
+/// True if no value is infinite or NaN. `Number`: float or double.
+template <typename Number>
+bool are_finite(std::span<const Number> values) {
+  using Bits = std::conditional_t<sizeof(Number) == sizeof(float), std::uint32_t, std::uint64_t>;
+  constexpr Bits kInfinity = std::bit_cast<Bits>(std::numeric_limits<Number>::infinity());
+  constexpr Bits kMagnitude = ~Bits{0} >> 1U;  // all but the sign
+  Bits largest = 0;
+  for (const Number value : values) {
+    largest = std::max(largest, std::bit_cast<Bits>(value) & kMagnitude);
   }
-  return largest < 0x7F800000U;
+  return largest < kInfinity;
 }
 
 /// True if none of the IEEE half-precision numbers with these bits is infinite or NaN.

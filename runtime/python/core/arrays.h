@@ -5,13 +5,12 @@
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
-#include <algorithm>
-#include <cmath>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "rebounce/types.h"
+#include "transfer/base/finite_values.h"
 
 namespace rebounce::python {
 
@@ -25,7 +24,7 @@ using Array = py::array_t<T, py::array::c_style | py::array::forcecast>;
 /// have no number for what is not.
 template <typename Number>
 void check_finite(std::span<const Number> values, const char* name) {
-  if (std::ranges::all_of(values, [](Number x) { return std::isfinite(x); })) return;
+  if (are_finite(values)) return;
   throw py::value_error(std::string(name) + " has a number that is not finite");
 }
 

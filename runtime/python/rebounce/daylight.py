@@ -310,8 +310,8 @@ def simulate_year(
     patches goes to the sensors `batch` hours at a time. Lamps, and surfaces that emit, are evaluated
     once, beside: they are dark in the hours.
     ground_reflectance: in [0, 1], of the ground below the horizon. points_per_patch: as of Engine.
-    progress: see precompute. Raises ValueError if ground_reflectance is out of range, Error if the data have no sky cells, because the scene is
-    closed, or a lamp is out of range.
+    progress: see precompute. Raises ValueError if ground_reflectance is out of range, Error if the
+    data have no sky cells, because the scene is closed, or a lamp is out of range.
     """
     to_sun = sun_position(weather)
     cells, sun_lux = perez_sky(
