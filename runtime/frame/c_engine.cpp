@@ -69,17 +69,16 @@ void take_light(const rebounce_light* lights, std::size_t k, Light& light) {
 
 extern "C" {
 
-void rebounce_light_init(rebounce_light* light) {
-  if (light == nullptr) return;
+void rebounce_light_init_sized(rebounce_light* light, uint32_t struct_size) {
   const Light defaults;
-  *light = {};
-  light->struct_size = sizeof(*light);
-  light->type = REBOUNCE_LIGHT_POINT;
-  std::ranges::copy(defaults.direction, light->direction);
-  std::ranges::copy(defaults.color, light->color);
-  light->intensity = defaults.intensity;
-  light->outer_cone_angle = defaults.outer_cone_angle;
-  std::ranges::copy(defaults.tangent, light->tangent);
+  rebounce_light made{};
+  made.type = REBOUNCE_LIGHT_POINT;
+  std::ranges::copy(defaults.direction, made.direction);
+  std::ranges::copy(defaults.color, made.color);
+  made.intensity = defaults.intensity;
+  made.outer_cone_angle = defaults.outer_cone_angle;
+  std::ranges::copy(defaults.tangent, made.tangent);
+  init_sized(light, made, struct_size);
 }
 
 rebounce_status rebounce_ies_profile_parse(const char* text, size_t text_size, const char* name,
@@ -100,8 +99,9 @@ void rebounce_ies_profile_destroy(rebounce_ies_profile* profile) {
   delete profile;
 }
 
-void rebounce_engine_settings_init(rebounce_engine_settings* settings) {
-  if (settings != nullptr) *settings = {sizeof(*settings), 8, 4, 16, nullptr, nullptr};
+void rebounce_engine_settings_init_sized(rebounce_engine_settings* settings, uint32_t struct_size) {
+  init_sized(settings, rebounce_engine_settings{struct_size, 8, 4, 16, nullptr, nullptr},
+             struct_size);
 }
 
 rebounce_status rebounce_engine_create(rebounce_transfer* transfer,

@@ -106,6 +106,17 @@ Struct take(const void* given, Struct defaults, std::size_t least_size, const ch
   return defaults;
 }
 
+/// Copies to `given`, which may be NULL, as many bytes of `defaults` as the caller's version of the
+/// structure has, and its size.
+template <typename Struct>
+void init_sized(void* given, Struct defaults, std::uint32_t struct_size) {
+  if (given == nullptr || struct_size < sizeof(struct_size)) return;
+  defaults.struct_size = struct_size;
+  std::memcpy(given, &defaults, std::min<std::size_t>(struct_size, sizeof(Struct)));
+  if (struct_size <= sizeof(Struct)) return;
+  std::memset(static_cast<char*>(given) + sizeof(Struct), 0, struct_size - sizeof(Struct));
+}
+
 /// Reads light k of an array whose entries have the size that the caller states.
 void take_light(const rebounce_light* lights, std::size_t k, Light& light);
 

@@ -77,10 +77,8 @@ void rebounce_transfer_release(rebounce_transfer* transfer) {
   if (transfer->references.fetch_sub(1, std::memory_order_acq_rel) == 1) delete transfer;
 }
 
-void rebounce_transfer_info_init(rebounce_transfer_info* info) {
-  if (info == nullptr) return;
-  *info = {};
-  info->struct_size = sizeof(*info);
+void rebounce_transfer_info_init_sized(rebounce_transfer_info* info, uint32_t struct_size) {
+  init_sized(info, rebounce_transfer_info{}, struct_size);
 }
 
 rebounce_status rebounce_transfer_get_info(const rebounce_transfer* transfer,
@@ -181,12 +179,10 @@ const char* rebounce_transfer_camera_name(const rebounce_transfer* transfer, uin
   return found == nullptr ? nullptr : found->name.c_str();
 }
 
-void rebounce_camera_init(rebounce_camera* camera) {
-  if (camera == nullptr) return;
-  const Camera defaults;
-  *camera = {};
-  camera->struct_size = sizeof(*camera);
-  copy_camera(defaults, *camera);
+void rebounce_camera_init_sized(rebounce_camera* camera, uint32_t struct_size) {
+  rebounce_camera made{};
+  copy_camera(Camera{}, made);
+  init_sized(camera, made, struct_size);
 }
 
 rebounce_status rebounce_transfer_get_camera(const rebounce_transfer* transfer, uint32_t index,

@@ -118,11 +118,10 @@ rebounce_status rebounce_gpu_engine_set_sky(rebounce_gpu_engine* engine, const r
   });
 }
 
-void rebounce_gpu_lamp_init(rebounce_gpu_lamp* lamp) {
-  if (lamp == nullptr) return;
-  *lamp = {};
-  lamp->struct_size = sizeof(*lamp);
-  std::ranges::copy(GpuLamp().depth_range, lamp->depth_range);
+void rebounce_gpu_lamp_init_sized(rebounce_gpu_lamp* lamp, uint32_t struct_size) {
+  rebounce_gpu_lamp made{};
+  std::ranges::copy(GpuLamp().depth_range, made.depth_range);
+  init_sized(lamp, made, struct_size);
 }
 
 rebounce_status rebounce_gpu_engine_light_patches(rebounce_gpu_engine* engine,
@@ -139,8 +138,8 @@ rebounce_status rebounce_gpu_engine_light_patches(rebounce_gpu_engine* engine,
   });
 }
 
-void rebounce_gpu_buffers_init(rebounce_gpu_buffers* buffers) {
-  if (buffers != nullptr) *buffers = {sizeof(*buffers), 0, 0, 0, 0, 0, 0};
+void rebounce_gpu_buffers_init_sized(rebounce_gpu_buffers* buffers, uint32_t struct_size) {
+  init_sized(buffers, rebounce_gpu_buffers{}, struct_size);
 }
 
 rebounce_status rebounce_gpu_engine_relight(rebounce_gpu_engine* engine,

@@ -47,6 +47,8 @@ GlFunctions::GlFunctions(GlGetProcAddress get) {
   load(get, "glActiveTexture", active_texture);
   load(get, "glBindTexture", bind_texture);
   load(get, "glIsTexture", is_texture);
+  load(get, "glGetTexParameteriv", get_texture);
+  load(get, "glGetTexLevelParameteriv", get_texture_level);
   load(get, "glGenSamplers", gen_samplers);
   load(get, "glDeleteSamplers", delete_samplers);
   load(get, "glBindSampler", bind_sampler);

@@ -39,6 +39,8 @@ struct GlFunctions {
   void (*active_texture)(Enum unit);
   void (*bind_texture)(Enum target, unsigned name);
   unsigned char (*is_texture)(unsigned name);
+  void (*get_texture)(Enum target, Enum name, int* value);
+  void (*get_texture_level)(Enum target, int level, Enum name, int* value);
   void (*gen_samplers)(int count, unsigned* names);
   void (*delete_samplers)(int count, const unsigned* names);
   void (*bind_sampler)(unsigned unit, unsigned name);
@@ -84,7 +86,9 @@ struct Gl {
                                      kSamplerBinding = 0x8919;
   static constexpr GlFunctions::Enum kTexture2D = 0x0DE1, kTexture2DBinding = 0x8069,
                                      kTextureArray = 0x8C1A, kTextureArrayBinding = 0x8C1D,
-                                     kTextureCube = 0x8513, kTextureCubeBinding = 0x8514;
+                                     kTextureCube = 0x8513, kTextureCubeBinding = 0x8514,
+                                     kFirstCubeFace = 0x8515;
+  static constexpr GlFunctions::Enum kBaseLevel = 0x813C, kLayerCount = 0x8071, kDepthBits = 0x884A;
   static constexpr GlFunctions::Enum kMinFilter = 0x2801, kMagFilter = 0x2800, kLinear = 0x2601,
                                      kWrapS = 0x2802, kWrapT = 0x2803, kClampToEdge = 0x812F,
                                      kCompareMode = 0x884C, kCompareToTexture = 0x884E,

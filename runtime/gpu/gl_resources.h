@@ -94,6 +94,8 @@ class StorageBuffer {
 };
 
 /// The time of stages on the card, by queries of time stamps; nothing until it is switched on.
+/// Contexts do not share queries, and one may give its own the same names: from switching it on to
+/// switching it off, or destruction, all calls are made with one context.
 class StageTimer {
  public:
   explicit StageTimer(std::shared_ptr<const GlFunctions> gl, std::size_t most_stages);

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstring>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "rebounce/error.h"
@@ -135,6 +136,36 @@ void check_lamp(std::size_t number, const GpuLamp& lamp) {
   }
 }
 
+/// A number of the base level of `image`: a face of the cube, or else what is bound to `target`.
+int texture_number(const GlFunctions& gl, GlFunctions::Enum target, GlFunctions::Enum image,
+                   GlFunctions::Enum name) {
+  int base_level = 0, number = 0;
+  gl.get_texture(target, Gl::kBaseLevel, &base_level);
+  gl.get_texture_level(image, base_level, name, &number);
+  return number;
+}
+
+/// Whether the texture that is bound to `target` has storage for depths, a cube at every face.
+bool has_depths(const GlFunctions& gl, GlFunctions::Enum target) {
+  const bool is_cube = target == Gl::kTextureCube;
+  const GlFunctions::Enum first = is_cube ? Gl::kFirstCubeFace : target;
+  const unsigned image_count = is_cube ? 6 : 1;
+  for (unsigned k = 0; k < image_count; ++k) {
+    if (texture_number(gl, target, first + k, Gl::kDepthBits) == 0) return false;
+  }
+  return true;
+}
+
+void check_layers(std::size_t number, const GpuLamp& lamp, int layer_count) {
+  for (const GpuShadowView& view : lamp.views) {
+    if (std::cmp_greater_equal(view.layer, layer_count)) {
+      refuse_lamp(number, "a view is in layer " + std::to_string(view.layer) + ", and texture " +
+                              std::to_string(lamp.texture) + " has " + std::to_string(layer_count) +
+                              " layers; count them from 0, and draw one for each view");
+    }
+  }
+}
+
 /// The views that its shadow map has; others do not count, and are not looked at.
 std::span<const GpuShadowView> views_of(const GpuLamp& lamp) {
   const bool has_views =
@@ -214,21 +245,34 @@ std::size_t GpuDirectLight::bytes() const {
   return points_.size() + runs_.size() + of_runs_.size();
 }
 
-void GpuDirectLight::check_texture(std::size_t number, const GpuLamp& lamp) const {
-  if (lamp.shadow_map == GpuShadowMap::kNoShadow) return;
+/// Whether the texture of a lamp is of the kind of its shadow map; it is bound then, its unit
+/// active.
+bool GpuDirectLight::bind_to_look(const GpuLamp& lamp) const {
+  if (gl_->is_texture(lamp.texture) == 0) return false;
   const TextureKind kind = texture_kind(lamp.shadow_map);
   int bound = 0;
-  if (gl_->is_texture(lamp.texture) != 0) {
-    gl_->active_texture(Gl::kTexture0 + unit_of(lamp.shadow_map, 0));
-    gl_->bind_texture(kind.target, 0);
-    gl_->bind_texture(kind.target, lamp.texture);
-    gl_->get_integer(kind.binding, &bound);
-    if (bound == 0) gl_->get_error();  // that it has another kind
-  }
-  if (bound == 0) {
+  gl_->active_texture(Gl::kTexture0 + unit_of(lamp.shadow_map, 0));
+  gl_->bind_texture(kind.target, 0);
+  gl_->bind_texture(kind.target, lamp.texture);
+  gl_->get_integer(kind.binding, &bound);
+  if (bound == 0) gl_->get_error();  // that it has another kind
+  return bound != 0;
+}
+
+void GpuDirectLight::check_texture(std::size_t number, const GpuLamp& lamp) const {
+  if (lamp.shadow_map == GpuShadowMap::kNoShadow) return;
+  if (!bind_to_look(lamp)) {
     refuse_lamp(number,
                 std::to_string(lamp.texture) + " is no texture of the kind of its shadow map");
   }
+  const GlFunctions::Enum target = texture_kind(lamp.shadow_map).target;
+  if (!has_depths(*gl_, target)) {
+    refuse_lamp(number, "texture " + std::to_string(lamp.texture) +
+                            " has no storage for depths; give it some, of a depth format, and draw "
+                            "the shadow map");
+  }
+  if (lamp.shadow_map == GpuShadowMap::kLayers)
+    check_layers(number, lamp, texture_number(*gl_, target, target, Gl::kLayerCount));
 }
 
 void GpuDirectLight::bind_texture(const GpuLamp& lamp, std::size_t slot) const {
@@ -239,12 +283,15 @@ void GpuDirectLight::bind_texture(const GpuLamp& lamp, std::size_t slot) const {
   gl_->bind_sampler(unit, samplers_[depth_falls(lamp) ? 1 : 0]);
 }
 
-void GpuDirectLight::run(std::span<const GpuLamp> lamps, unsigned others,
-                         unsigned direct_irradiance) {
+void GpuDirectLight::check(std::span<const GpuLamp> lamps) const {
   for (std::size_t k = 0; k < lamps.size(); ++k) {
     check_lamp(k, lamps[k]);
     check_texture(k, lamps[k]);
   }
+}
+
+void GpuDirectLight::run(std::span<const GpuLamp> lamps, unsigned others,
+                         unsigned direct_irradiance) {
   const std::size_t run_count = runs_for(lamps.size());
   const auto lamps_of = [&](std::size_t k) {
     const std::span<const GpuLamp> left = lamps.subspan(k * kLampsPerRun);

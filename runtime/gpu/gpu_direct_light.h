@@ -22,11 +22,16 @@ class GpuDirectLight {
 
   std::size_t bytes() const;
 
-  /// As GpuEngine::light_patches, with buffers that fit. Program, buffers and textures at the
-  /// bindings that GlStateGuard and GlTextureGuard keep change.
+  /// Throws Error with the number of the first lamp that run() cannot light. Textures at the
+  /// bindings that GlTextureGuard keeps change.
+  void check(std::span<const GpuLamp> lamps) const;
+
+  /// As GpuEngine::light_patches, with lamps that check() accepts and buffers that fit. Program,
+  /// buffers and textures at the bindings that GlStateGuard and GlTextureGuard keep change.
   void run(std::span<const GpuLamp> lamps, unsigned others, unsigned direct_irradiance);
 
  private:
+  bool bind_to_look(const GpuLamp& lamp) const;
   void check_texture(std::size_t number, const GpuLamp& lamp) const;
   void bind_texture(const GpuLamp& lamp, std::size_t slot) const;
 

@@ -279,6 +279,7 @@ struct GpuEngine::Parts {
   }
 
   void light_patches(std::span<const GpuLamp> lamps, unsigned direct_irradiance, unsigned others) {
+    direct_light.check(lamps);  // a refused frame leaves the times of the last one
     direct_timer.begin();
     gl->memory_barrier(Gl::kAllBarriers);  // shadow maps are drawn, buffers written
     direct_light.run(lamps, others, direct_irradiance);

@@ -40,9 +40,11 @@ extern "C" {
 #endif
 
 /* Raised when a function or structure of this header changes its meaning. Structures that may grow
- * begin with their size, which the _init functions fill in: a program that was compiled with an
- * older header goes on working, and what its structures lack has its default. */
-#define REBOUNCE_ABI_VERSION 1
+ * begin with their size: a program that was compiled with an older header goes on working, and what
+ * its structures lack has its default. Each has an _init macro, which fills in the size and the
+ * defaults, and an _init_sized function behind it, for languages that know no macros: it writes no
+ * more than struct_size bytes, the size of the caller's structure. */
+#define REBOUNCE_ABI_VERSION 2
 
 typedef enum rebounce_status {
   REBOUNCE_OK = 0,
@@ -100,7 +102,9 @@ typedef struct rebounce_transfer_info {
 } rebounce_transfer_info;
 
 /* Writes the size, and zeros. */
-void rebounce_transfer_info_init(rebounce_transfer_info* info);
+void rebounce_transfer_info_init_sized(rebounce_transfer_info* info, uint32_t struct_size);
+#define rebounce_transfer_info_init(info) \
+  rebounce_transfer_info_init_sized(info, sizeof(rebounce_transfer_info))
 
 rebounce_status rebounce_transfer_get_info(const rebounce_transfer* transfer,
                                            rebounce_transfer_info* info);
@@ -169,7 +173,8 @@ typedef struct rebounce_camera {
 } rebounce_camera;
 
 /* Writes the size, and a camera at the origin that looks along -z. */
-void rebounce_camera_init(rebounce_camera* camera);
+void rebounce_camera_init_sized(rebounce_camera* camera, uint32_t struct_size);
+#define rebounce_camera_init(camera) rebounce_camera_init_sized(camera, sizeof(rebounce_camera))
 
 /* Camera `index` of the scene, of camera_count, and its name (UTF-8, may be empty); NULL where
  * there is no such camera. */
@@ -220,8 +225,9 @@ typedef struct rebounce_light {
                                           its candelas, along direction; default NULL */
 } rebounce_light;
 
-/* Writes the defaults. */
-void rebounce_light_init(rebounce_light* light);
+/* Writes the size, and the defaults. */
+void rebounce_light_init_sized(rebounce_light* light, uint32_t struct_size);
+#define rebounce_light_init(light) rebounce_light_init_sized(light, sizeof(rebounce_light))
 
 /* The luminance in cd/m² in every direction in which the scene is open; times the distribution of
  * the engine's sky, where it has one. */
@@ -267,7 +273,9 @@ typedef struct rebounce_engine_settings {
   void* user;                         /* what parallel_for is called with; default NULL */
 } rebounce_engine_settings;
 
-void rebounce_engine_settings_init(rebounce_engine_settings* settings);
+void rebounce_engine_settings_init_sized(rebounce_engine_settings* settings, uint32_t struct_size);
+#define rebounce_engine_settings_init(settings) \
+  rebounce_engine_settings_init_sized(settings, sizeof(rebounce_engine_settings))
 
 /* Makes an engine; settings may be NULL. It keeps the transfer's data. */
 rebounce_status rebounce_engine_create(rebounce_transfer* transfer,
@@ -451,13 +459,15 @@ typedef struct rebounce_gpu_lamp {
 } rebounce_gpu_lamp;
 
 /* Writes the size, and the defaults: no shadow map, a depth range of 0.05 to 100. */
-void rebounce_gpu_lamp_init(rebounce_gpu_lamp* lamp);
+void rebounce_gpu_lamp_init_sized(rebounce_gpu_lamp* lamp, uint32_t struct_size);
+#define rebounce_gpu_lamp_init(lamp) rebounce_gpu_lamp_init_sized(lamp, sizeof(rebounce_gpu_lamp))
 
 /* Writes the direct irradiance [patch_count][3] in lx to the buffer of this name: what the buffer
  * `others` has (0: nothing), lamps with a surface and skies for instance, and the light of `lamps`
  * at the rebounce_transfer_receiver_points, 8 on each patch. The shadow maps are complete; shaders
  * that write the others and read the result need no barrier. What does not fit is refused, with the
- * lamp's number; nothing is done then. */
+ * lamp's number, as is a texture without storage for depths, or with fewer layers than a view asks
+ * for; nothing is done then. */
 rebounce_status rebounce_gpu_engine_light_patches(rebounce_gpu_engine* engine,
                                                   const rebounce_gpu_lamp* lamps, size_t lamp_count,
                                                   uint32_t direct_irradiance, uint32_t others);
@@ -476,7 +486,9 @@ typedef struct rebounce_gpu_buffers {
 } rebounce_gpu_buffers;
 
 /* Writes the size, and zeros. */
-void rebounce_gpu_buffers_init(rebounce_gpu_buffers* buffers);
+void rebounce_gpu_buffers_init_sized(rebounce_gpu_buffers* buffers, uint32_t struct_size);
+#define rebounce_gpu_buffers_init(buffers) \
+  rebounce_gpu_buffers_init_sized(buffers, sizeof(rebounce_gpu_buffers))
 
 /* Hands one frame to the card, and waits for nothing. Shaders that write the direct irradiance
  * before and read results afterwards need no barrier. The direct irradiance is not looked at: what

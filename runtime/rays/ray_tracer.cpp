@@ -3,6 +3,7 @@
 #include "runtime/rays/ray_tracer.h"
 
 #include <embree3/rtcore.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
@@ -10,6 +11,7 @@
 #include <cassert>
 #include <cmath>
 #include <cstddef>
+#include <new>
 #include <string>
 
 #include "rebounce/error.h"
@@ -32,18 +34,20 @@ static_assert(RTC_INVALID_GEOMETRY_ID == kNone);
 
 constexpr std::size_t kBatch = 64;  // rays that intersect() copies to the stack at a time
 
-// One builder thread: then the tree is the same on every machine, and so is the choice between
-// coincident triangles. No threads remain afterwards.
-constexpr const char* kDeviceConfig = "threads=1";
-
 void throw_if_failed(RTCDevice device, const char* step) {
   const RTCError code = rtcGetDeviceError(device);
   if (code == RTC_ERROR_NONE) return;
-  const bool memory = code == RTC_ERROR_OUT_OF_MEMORY;
-  throw Error("ray tracer: " + std::string(step) + " failed, " +
-              (memory
-                   ? "out of memory; use a smaller scene or a larger machine"
-                   : "Embree error " + std::to_string(code) + "; check the Embree installation"));
+  if (code == RTC_ERROR_OUT_OF_MEMORY) throw std::bad_alloc();
+  throw Error("ray tracer: " + std::string(step) + " failed, Embree error " + std::to_string(code) +
+              "; check the Embree installation");
+}
+
+// Builds the tree on one thread: then it is the same on every machine, and so is the choice between
+// coincident triangles. An arena of its own does that; Embree's option `threads` limits TBB in the
+// whole process for as long as a device lives.
+void build_on_this_thread(RTCScene scene) {
+  tbb::task_arena arena(1);
+  arena.execute([scene] { rtcCommitScene(scene); });
 }
 
 // The triangles of one Embree geometry.
@@ -198,7 +202,7 @@ struct RayTracer::Impl {
 RayTracer::RayTracer(std::span<const Float3> position, std::span<const Uint3> triangle,
                      const OpacityMaps& opacity)
     : impl_(std::make_unique<Impl>()) {
-  impl_->device = rtcNewDevice(kDeviceConfig);
+  impl_->device = rtcNewDevice(nullptr);
   if (impl_->device == nullptr) throw_if_failed(nullptr, "starting Embree");
   impl_->scene = rtcNewScene(impl_->device);
   throw_if_failed(impl_->device, "making a scene");
@@ -215,7 +219,7 @@ RayTracer::RayTracer(std::span<const Float3> position, std::span<const Uint3> tr
   // once for one hit, but transmittance() needs each hit exactly once.
   rtcSetSceneBuildQuality(impl_->scene,
                           impl_->has_porous() ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
-  rtcCommitScene(impl_->scene);
+  build_on_this_thread(impl_->scene);
   impl_->offset_distance = ray_offset_distance(position);
   throw_if_failed(impl_->device, "building the acceleration structure");
 }

@@ -4,7 +4,9 @@
 
 #define EGL_NO_X11
 #include <EGL/egl.h>
+#include <EGL/eglext.h>
 
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -31,6 +33,36 @@ class GlContext {
 
  private:
   std::optional<HeadlessContext> context_;
+};
+
+/// A second context, which shares the objects of the one that is current when it is made. That one
+/// is current again when this ends.
+class SharedContext {
+ public:
+  SharedContext() : display_(eglGetCurrentDisplay()), first_(eglGetCurrentContext()) {
+    constexpr std::array<EGLint, 5> kVersion = {EGL_CONTEXT_MAJOR_VERSION, 4,
+                                                EGL_CONTEXT_MINOR_VERSION, 3, EGL_NONE};
+    second_ = eglCreateContext(display_, EGL_NO_CONFIG_KHR, first_, kVersion.data());
+  }
+  ~SharedContext() {
+    use_first();
+    eglDestroyContext(display_, second_);
+  }
+  SharedContext(const SharedContext&) = delete;
+  SharedContext& operator=(const SharedContext&) = delete;
+
+  /// Makes it current; false if the machine has none.
+  bool use() const { return second_ != EGL_NO_CONTEXT && use(second_); }
+  bool use_first() const { return use(first_); }
+
+ private:
+  bool use(EGLContext context) const {
+    reinterpret_cast<void (*)()>(eglGetProcAddress("glFinish"))();
+    return eglMakeCurrent(display_, EGL_NO_SURFACE, EGL_NO_SURFACE, context) == EGL_TRUE;
+  }
+
+  EGLDisplay display_;
+  EGLContext first_, second_;
 };
 
 /// A buffer of light in the current context.

@@ -23,13 +23,17 @@
 
 namespace rebounce::test {
 
-/// An empty texture of depths.
+/// An empty texture of depths; without layers it has no storage.
 class DepthTexture {
  public:
-  explicit DepthTexture(GLenum target) {
+  explicit DepthTexture(GLenum target, GLsizei layers = 1) {
     glGenTextures(1, &name_);
     glBindTexture(target, name_);
-    glTexStorage2D(target, 1, GL_DEPTH_COMPONENT32F, 4, 4);
+    if (layers > 0 && target == GL_TEXTURE_2D_ARRAY) {
+      glTexStorage3D(target, 1, GL_DEPTH_COMPONENT32F, 4, 4, layers);
+    } else if (layers > 0) {
+      glTexStorage2D(target, 1, GL_DEPTH_COMPONENT32F, 4, 4);
+    }
     glBindTexture(target, 0);
   }
   ~DepthTexture() { glDeleteTextures(1, &name_); }

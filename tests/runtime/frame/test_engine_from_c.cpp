@@ -419,6 +419,39 @@ TEST_F(FromC, StructuresOfVersion1AreUnderstood) {
   EXPECT_EQ(rebounce_engine_relight(engine_, as_given, 1, nullptr), REBOUNCE_INVALID_ARGUMENT);
 }
 
+/// Bytes that `init` writes to a structure that its caller knows `size` bytes of; what is beyond
+/// must stay.
+template <typename Struct>
+std::vector<unsigned char> bytes_of_init(void (*init)(Struct*, std::uint32_t), std::size_t size) {
+  constexpr unsigned char kUntouched = 0xAB;
+  alignas(Struct) std::array<unsigned char, sizeof(Struct) + 64> memory;
+  memory.fill(kUntouched);
+  init(reinterpret_cast<Struct*>(memory.data()), static_cast<std::uint32_t>(size));
+  const auto end = memory.begin() + static_cast<std::ptrdiff_t>(size);
+  EXPECT_TRUE(
+      std::all_of(end, memory.end(), [](unsigned char byte) { return byte == kUntouched; }));
+  return {memory.begin(), end};
+}
+
+TEST_F(FromC, InitWritesWhatTheCallersVersionOfAStructureHas) {
+  const auto whole = bytes_of_init(rebounce_light_init_sized, sizeof(rebounce_light));
+  auto older = bytes_of_init(rebounce_light_init_sized, sizeof(LightOfVersion1));
+  EXPECT_EQ(older[0], sizeof(LightOfVersion1));
+  EXPECT_TRUE(std::equal(older.begin() + 4, older.end(), whole.begin() + 4));
+  bytes_of_init(rebounce_engine_settings_init_sized, sizeof(SettingsOfVersion1));
+  bytes_of_init(rebounce_transfer_info_init_sized,
+                offsetof(rebounce_transfer_info, lightmap_width));
+  bytes_of_init(rebounce_camera_init_sized, sizeof(rebounce_camera));
+
+  const auto later = bytes_of_init(rebounce_light_init_sized, sizeof(rebounce_light) + 8);
+  EXPECT_EQ(later[0], sizeof(rebounce_light) + 8);
+  EXPECT_TRUE(
+      std::all_of(later.end() - 8, later.end(), [](unsigned char byte) { return byte == 0; }));
+
+  EXPECT_EQ(bytes_of_init(rebounce_light_init_sized, 3), std::vector<unsigned char>(3, 0xAB));
+  rebounce_light_init_sized(nullptr, sizeof(rebounce_light));
+}
+
 TEST_F(FromC, AFrameRunsOnTheThreadsOfTheCaller) {
   test::ThreadPool pool(3);
   rebounce_engine_settings settings;

@@ -363,6 +363,60 @@ TEST_F(GpuEngineTest, RefusesLampsItCannotLight) {
                      "points_per_patch is 0");
 }
 
+/// A lamp with the views of a shadow map.
+GpuLamp lamp_with_map(GpuShadowMap kind, const test::DepthTexture& texture,
+                      std::span<const GpuShadowView> views) {
+  return {.light = {}, .shadow_map = kind, .texture = texture.name(), .views = views};
+}
+
+TEST_F(GpuEngineTest, RefusesShadowMapsWithoutTheirStorage) {
+  const auto data = nested_squares();
+  const std::vector<Float3> before = test::random_light(kPatches, 23, 100);
+  const test::LightBuffer direct(before);
+  GpuEngine gpu(data, eglGetProcAddress);
+  const auto refused = [&](const GpuLamp& lamp, const std::string& part) {
+    const std::array<GpuLamp, 2> lamps = {GpuLamp{}, lamp};
+    test::expect_error([&] { gpu.light_patches(lamps, direct.name()); },
+                       ("lamp 1: " + part).c_str());
+    EXPECT_EQ(direct.read(), before);
+    EXPECT_EQ(glGetError(), 0U);
+  };
+  const auto of_texture = [](const test::DepthTexture& texture, const char* part) {
+    return "texture " + std::to_string(texture.name()) + part;
+  };
+  const std::array<GpuShadowView, 2> views = {GpuShadowView{.layer = 0}, {.layer = 2}};
+  const test::DepthTexture no_plane(GL_TEXTURE_2D, 0), no_layers(GL_TEXTURE_2D_ARRAY, 0),
+      no_cube(GL_TEXTURE_CUBE_MAP, 0), half_a_cube(GL_TEXTURE_CUBE_MAP, 0), color(GL_TEXTURE_2D, 0),
+      upper(GL_TEXTURE_2D, 0), plane(GL_TEXTURE_2D), two(GL_TEXTURE_2D_ARRAY, 2),
+      three(GL_TEXTURE_2D_ARRAY, 3);
+  const auto allocate = [](GLenum target, GLint level, GLenum format) {
+    glTexImage2D(target, level, static_cast<GLint>(format), 4, 4, 0,
+                 format == GL_RGBA8 ? GL_RGBA : GL_DEPTH_COMPONENT, GL_FLOAT, nullptr);
+  };
+  glBindTexture(GL_TEXTURE_CUBE_MAP, half_a_cube.name());
+  for (GLenum face = 0; face < 3; ++face)
+    allocate(GL_TEXTURE_CUBE_MAP_POSITIVE_X + face, 0, GL_DEPTH_COMPONENT32F);
+  glBindTexture(GL_TEXTURE_2D, color.name());
+  allocate(GL_TEXTURE_2D, 0, GL_RGBA8);
+  glBindTexture(GL_TEXTURE_2D, upper.name());
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_BASE_LEVEL, 1);
+  allocate(GL_TEXTURE_2D, 1, GL_DEPTH_COMPONENT32F);
+  for (const test::DepthTexture* const texture : {&no_plane, &color})
+    refused(lamp_with_map(GpuShadowMap::kPlane, *texture, views),
+            of_texture(*texture, " has no storage for depths"));
+  for (const test::DepthTexture* const texture : {&no_cube, &half_a_cube})
+    refused(lamp_with_map(GpuShadowMap::kCube, *texture, {}),
+            of_texture(*texture, " has no storage for depths"));
+  refused(lamp_with_map(GpuShadowMap::kLayers, no_layers, views),
+          of_texture(no_layers, " has no storage for depths"));
+  refused(lamp_with_map(GpuShadowMap::kLayers, two, views),
+          "a view is in layer 2, and " + of_texture(two, " has 2 layers"));
+  const std::array<GpuLamp, 3> good = {lamp_with_map(GpuShadowMap::kLayers, three, views),
+                                       lamp_with_map(GpuShadowMap::kPlane, plane, views),
+                                       lamp_with_map(GpuShadowMap::kPlane, upper, views)};
+  EXPECT_NO_THROW(gpu.light_patches(good, direct.name())) << "planes have no layers";
+}
+
 TEST_F(GpuEngineTest, LeavesTheTexturesOfTheContext) {
   const auto data = nested_squares();
   const test::LightBuffer direct(kPatches);
@@ -424,8 +478,62 @@ TEST_F(GpuEngineTest, MeasuresItsStages) {
   EXPECT_STREQ(times[0].name, "direct light");
   EXPECT_STREQ(times.back().name, "vertices");
   for (const GpuStageTime& time : times) EXPECT_GE(time.microseconds, 0) << time.name;
+  const GpuLamp refused{.light = light_of_type(LightType::kSphere)};
+  test::expect_error([&] { gpu.light_patches({&refused, 1}, buffers.direct.name()); }, "lamp 0");
+  const std::vector<GpuStageTime> kept = gpu.stage_times();
+  ASSERT_EQ(kept.size(), times.size());
+  for (std::size_t k = 0; k < times.size(); ++k) {
+    EXPECT_STREQ(kept[k].name, times[k].name);
+    EXPECT_EQ(kept[k].microseconds, times[k].microseconds) << times[k].name;
+  }
   gpu.measure_stages(false);
   EXPECT_TRUE(gpu.stage_times().empty());
+}
+
+/// Queries of the current context, whose names an engine may have in another one.
+std::vector<GLuint> some_queries() {
+  std::vector<GLuint> names(50);
+  glGenQueries(static_cast<GLsizei>(names.size()), names.data());
+  for (const GLuint name : names) {
+    glBeginQuery(GL_SAMPLES_PASSED, name);
+    glEndQuery(GL_SAMPLES_PASSED);
+  }
+  return names;
+}
+
+TEST_F(GpuEngineTest, RunsInContextsThatShareObjects) {
+  const auto data = nested_squares();
+  const test::FrameBuffers buffers(*data, test::random_light(kPatches, 24, 100));
+  const std::vector<GpuLamp> lamps = a_lamp_of_each_kind();
+  auto gpu = std::make_unique<GpuEngine>(data, eglGetProcAddress);
+  const auto frame = [&] {
+    gpu->light_patches(lamps, buffers.direct.name());
+    gpu->relight(buffers.names());
+    return buffers.radiosity.read();
+  };
+  const auto measured_stages = [&] {
+    gpu->measure_stages(true);
+    frame();
+    const std::size_t count = gpu->stage_times().size();
+    gpu->measure_stages(false);
+    return count;
+  };
+  const std::vector<Float3> radiosity = frame();
+  const std::size_t stage_count = measured_stages();
+  EXPECT_GE(stage_count, 6U);
+  const test::SharedContext other;
+  ASSERT_TRUE(other.use());
+  const std::vector<GLuint> queries = some_queries();
+  EXPECT_EQ(frame(), radiosity);
+  EXPECT_EQ(measured_stages(), stage_count);
+  ASSERT_TRUE(other.use_first());
+  EXPECT_EQ(frame(), radiosity);
+  EXPECT_EQ(measured_stages(), stage_count);
+  EXPECT_EQ(glGetError(), 0U);
+  ASSERT_TRUE(other.use());
+  gpu.reset();
+  for (const GLuint name : queries) EXPECT_TRUE(glIsQuery(name)) << name;
+  EXPECT_EQ(glGetError(), 0U);
 }
 
 TEST_F(GpuEngineTest, SaysWhatTheCompilerSays) {
