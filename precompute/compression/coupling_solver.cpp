@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <exception>
 #include <optional>
 #include <string>
 #include <utility>
 
 #include "precompute/base/blas.h"
+#include "precompute/base/parallel_loop.h"
 #include "precompute/base/parallel_progress.h"
 #include "precompute/base/ranks.h"
 #include "precompute/compression/wanted_blocks.h"
@@ -164,24 +164,15 @@ void CouplingSolver::solve_run(std::size_t first, const Progress& progress) {
     if (is_missing(cell)) missing.push_back(cell);
   }
   for (const std::size_t cell : missing) couplings_[cell].resize(bases_.coupling_count(cell));
-  std::exception_ptr failure;
   ParallelProgress loop(progress, packs.size());
-#pragma omp parallel
-  {
-    SolvedTransfer::Workspace workspace;
-#pragma omp for schedule(dynamic, 1)
-    for (std::size_t k = 0; k < packs.size(); ++k) {
-      if (loop.stopped()) continue;
-      try {
+  using Workspace = SolvedTransfer::Workspace;
+  parallel_loop(
+      packs.size(), 1, [] { return Workspace(); },
+      [&](std::size_t k, Workspace& workspace) {
+        if (loop.stopped()) return;
         solve(packs[k], workspace);
-      } catch (...) {
-#pragma omp critical
-        failure = std::current_exception();
-      }
-      loop.advance();
-    }
-  }
-  if (failure) std::rethrow_exception(failure);
+        loop.advance();
+      });
   loop.finish();
   for (const std::size_t cell : missing) {
     BlockPart part{.blocks = {}, .values = std::move(couplings_[cell])};

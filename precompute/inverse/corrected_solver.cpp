@@ -4,6 +4,7 @@
 #include <array>
 #include <utility>
 
+#include "precompute/base/parallel_loop.h"
 #include "precompute/base/ranks.h"
 #include "precompute/lights/reference_solution.h"
 #include "precompute/lights/solve_batches.h"
@@ -40,14 +41,11 @@ CorrectedSolver::CorrectedSolver(const SolvedTransfer& compressed,
 Lights CorrectedSolver::nearly_exact(std::span<const std::vector<Float3>> initial_exitances) const {
   if (nearly_inverse_ == nullptr) return compressed_.indirect_irradiances(initial_exitances);
   Lights light(initial_exitances.size(), std::vector<Float3>(patches_.size()));
-#pragma omp parallel
-  {
-    std::vector<float> workspace(nearly_inverse_->workspace_size());
-#pragma omp for schedule(dynamic, 1)
-    for (std::size_t k = 0; k < light.size(); ++k) {
-      nearly_inverse_->apply(initial_exitances[k], light[k], workspace);
-    }
-  }
+  parallel_loop(
+      light.size(), 1, [&] { return std::vector<float>(nearly_inverse_->workspace_size()); },
+      [&](std::size_t k, std::vector<float>& workspace) {
+        nearly_inverse_->apply(initial_exitances[k], light[k], workspace);
+      });
   return light;
 }
 

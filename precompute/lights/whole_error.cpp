@@ -4,10 +4,10 @@
 #include <cmath>
 #include <utility>
 
+#include "precompute/base/parallel_loop.h"
 #include "precompute/base/parallel_progress.h"
 #include "precompute/base/ranks.h"
 #include "precompute/exchange/pairs/escape.h"
-#include "runtime/rays/patch_points.h"
 #include "runtime/rays/sampling.h"
 #include "transfer/base/area_norm.h"
 #include "transfer/base/light_sum.h"
@@ -157,20 +157,20 @@ WholeErrorEstimator::MetRows WholeErrorEstimator::trace(std::size_t group,
   const Ranks ranks;
   MetRows met(rows);
   ParallelProgress loop(progress, rows);
-#pragma omp parallel
-  {
-    EscapeScratch scratch;
+  struct Scratch {
+    EscapeScratch escape;
     MetPatchCounter counter;
-#pragma omp for schedule(dynamic, 16)
-    for (std::size_t k = 0; k < rows; ++k) {
-      if (loop.stopped() || !ranks.makes(k)) continue;
-      const std::uint32_t i = patch_[group][k];
-      measure_escape(data_.mesh, shown_patch, triangles[i], i, tracer, ray_count_,
-                     mix_bits(seed_ + kGroups + group), scratch);
-      met[k] = counter.count(n, scratch.met);
-      loop.advance();
-    }
-  }
+  };
+  parallel_loop(
+      rows, 16, [] { return Scratch(); },
+      [&](std::size_t k, Scratch& scratch) {
+        if (loop.stopped() || !ranks.makes(k)) return;
+        const std::uint32_t i = patch_[group][k];
+        measure_escape(data_.mesh, shown_patch, triangles[i], i, tracer, ray_count_,
+                       mix_bits(seed_ + kGroups + group), scratch.escape);
+        met[k] = scratch.counter.count(n, scratch.escape.met);
+        loop.advance();
+      });
   loop.finish();
   ranks.share(std::span(met));
   return met;

@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 
+#include "precompute/base/parallel_loop.h"
 #include "precompute/outputs/emitter_points.h"
 #include "precompute/outputs/harmonic_view.h"
 #include "precompute/patches/hit_patch.h"
@@ -189,14 +190,12 @@ void trace_probes(const TransferData& data, std::span<const std::uint32_t> shown
     report_progress(progress, static_cast<double>(first) / static_cast<double>(probes.size()));
     const std::size_t count = std::min(kProbeBatch, probes.size() - first);
     views.resize(count);
-#pragma omp parallel
-    {
-      ProbeViewer viewer(data.mesh, shown_patch, tracer, emitters, settings.ray_count);
-#pragma omp for schedule(dynamic, 1)
-      for (std::size_t k = 0; k < count; ++k) {
-        views[k] = viewer.look_around(probes.position[first + k], first + k);
-      }
-    }
+    parallel_loop(
+        count, 1,
+        [&] { return ProbeViewer(data.mesh, shown_patch, tracer, emitters, settings.ray_count); },
+        [&](std::size_t k, ProbeViewer& viewer) {
+          views[k] = viewer.look_around(probes.position[first + k], first + k);
+        });
     for (const std::optional<ProbeView>& view : views) append(view, probes);
   }
 }

@@ -5,6 +5,7 @@
 #include <functional>
 #include <numeric>
 
+#include "precompute/base/parallel_loop.h"
 #include "precompute/base/parallel_progress.h"
 #include "precompute/compression/form_factor_compression.h"
 #include "precompute/lights/random_lights.h"
@@ -142,18 +143,19 @@ class RowBuilder {
     const PatchTriangles triangles(data_.mesh.triangle_patch, n);
     patch_rows_.resize(n);
     ParallelProgress parallel(progress, patches.size());
-#pragma omp parallel
-    {
-      ReceiverViewer viewer(data_.mesh, shown_patch_, n, tracer_, settings_.ray_count);
-#pragma omp for schedule(dynamic, 16)
-      for (std::size_t k = 0; k < patches.size(); ++k) {
-        if (parallel.stopped()) continue;
-        ViewRow& row = patch_rows_[patches[k]];
-        if (row.empty()) viewer.look_from_patch(triangles[patches[k]], row);
-        parallel.advance();
-      }
-    }
+    parallel_loop(
+        patches.size(), 16, [&] { return make_viewer(); },
+        [&](std::size_t k, ReceiverViewer& viewer) {
+          if (parallel.stopped()) return;
+          ViewRow& row = patch_rows_[patches[k]];
+          if (row.empty()) viewer.look_from_patch(triangles[patches[k]], row);
+          parallel.advance();
+        });
     parallel.finish();
+  }
+
+  ReceiverViewer make_viewer() const {
+    return {data_.mesh, shown_patch_, data_.patches.size(), tracer_, settings_.ray_count};
   }
 
   /// That of MadeReceiverRows, from receivers spread over all.
@@ -187,18 +189,20 @@ class RowBuilder {
   std::vector<AddedRow> compare_all(std::span<const std::uint32_t> receivers) const {
     std::vector<AddedRow> found(receivers.size());
     const double sight = mean_patch_size();
-#pragma omp parallel
-    {
-      ReceiverViewer viewer(data_.mesh, shown_patch_, data_.patches.size(), tracer_,
-                            settings_.ray_count);
-      std::vector<double> sum(data_.patches.size(), 0.0);
-#pragma omp for schedule(dynamic, 16)
-      for (std::size_t k = 0; k < receivers.size(); ++k) {
-        ViewRow row;
-        receivers_.look(receivers[k], sight, viewer, row);
-        if (!row.empty()) found[k] = compare(receivers[k], row, sum);
-      }
-    }
+    struct Scratch {
+      ReceiverViewer viewer;
+      std::vector<double> sum;
+    };
+    parallel_loop(
+        receivers.size(), 16,
+        [&] {
+          return Scratch{make_viewer(), std::vector<double>(data_.patches.size(), 0.0)};
+        },
+        [&](std::size_t k, Scratch& scratch) {
+          ViewRow row;
+          receivers_.look(receivers[k], sight, scratch.viewer, row);
+          if (!row.empty()) found[k] = compare(receivers[k], row, scratch.sum);
+        });
     return found;
   }
 
@@ -209,13 +213,12 @@ class RowBuilder {
       if (found[k].gain > settings_.tolerance) kept.push_back(k);
     }
     std::vector<Group> groups((kept.size() + kGroup - 1) / kGroup);
-#pragma omp parallel for schedule(dynamic, 1)
-    for (std::size_t g = 0; g < groups.size(); ++g) {
+    parallel_loop(groups.size(), [&](std::size_t g) {
       const std::span<const std::uint32_t> all(kept);
       const std::size_t first = g * kGroup;
       groups[g] = make_group(receivers, found,
                              all.subspan(first, std::min<std::size_t>(kGroup, all.size() - first)));
-    }
+    });
     for (const Group& group : groups) append(group);
   }
 
@@ -375,9 +378,7 @@ class RowBuilder {
     rows_.receiver.resize(std::size_t{kGroup} * rows_.group_count(), kNone);
   }
 
-  double whole_area() const {
-    return sources_.area_before.back();
-  }
+  double whole_area() const { return sources_.area_before.back(); }
   double mean_patch_size() const {
     return std::sqrt(whole_area() / static_cast<double>(data_.patches.size()));
   }

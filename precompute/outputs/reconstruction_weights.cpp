@@ -6,6 +6,7 @@
 #include <numeric>
 #include <vector>
 
+#include "precompute/base/parallel_loop.h"
 #include "precompute/outputs/local_max_entropy.h"
 #include "precompute/outputs/mean_preservation.h"
 #include "precompute/outputs/neighbour_search.h"
@@ -149,18 +150,16 @@ class ReconstructionWeights {
   /// Computes the weights of vertices [begin, end) before the preservation of means.
   void compute_batch(const NeighbourSearch& search, std::size_t begin, std::size_t end,
                      std::vector<VertexWeights>& weights) {
-#pragma omp parallel
-    {
-      NeighbourSearch::Scratch scratch(search);
-#pragma omp for schedule(dynamic, 64)
-      for (std::size_t v = begin; v < end; ++v) {
-        if (!receivers_[v].is_shown) continue;
-        std::vector<ReconstructionSite> sites = find_sites(search, v, scratch);
-        centre_weights(receivers_[v], sites);
-        if (std::ranges::all_of(sites, is(Exposure::kCovered))) shows_arriving_[v] = 1;
-        weights[v] = shows_arriving_[v] != 0 ? plain_weights(sites) : open_weights(sites);
-      }
-    }
+    parallel_loop(
+        end - begin, 64, [&] { return NeighbourSearch::Scratch(search); },
+        [&](std::size_t k, NeighbourSearch::Scratch& scratch) {
+          const std::size_t v = begin + k;
+          if (!receivers_[v].is_shown) return;
+          std::vector<ReconstructionSite> sites = find_sites(search, v, scratch);
+          centre_weights(receivers_[v], sites);
+          if (std::ranges::all_of(sites, is(Exposure::kCovered))) shows_arriving_[v] = 1;
+          weights[v] = shows_arriving_[v] != 0 ? plain_weights(sites) : open_weights(sites);
+        });
   }
 
   /// The square root of the mean area of the patches, metres.

@@ -4,6 +4,7 @@
 #include <limits>
 #include <map>
 
+#include "precompute/base/parallel_loop.h"
 #include "precompute/base/parallel_progress.h"
 #include "precompute/patches/hit_patch.h"
 #include "precompute/sampling/hemisphere_rays.h"
@@ -71,16 +72,13 @@ SensorView view_of_sensors(const DisplayMesh& mesh, const RayTracer& tracer,
   if (ray_count < 1) throw Error("sensors need at least one ray");
   std::vector<PointView> views(position.size());
   ParallelProgress loop(progress, position.size());
-#pragma omp parallel
-  {
-    SensorViewer viewer(mesh, tracer, ray_count);
-#pragma omp for schedule(dynamic, 4)
-    for (std::size_t k = 0; k < position.size(); ++k) {
-      if (loop.stopped()) continue;
-      views[k] = viewer.look(position[k], normal[k], k);
-      loop.advance();
-    }
-  }
+  parallel_loop(
+      position.size(), 4, [&] { return SensorViewer(mesh, tracer, ray_count); },
+      [&](std::size_t k, SensorViewer& viewer) {
+        if (loop.stopped()) return;
+        views[k] = viewer.look(position[k], normal[k], k);
+        loop.advance();
+      });
   loop.finish();
   SensorView result;
   for (const PointView& view : views) {

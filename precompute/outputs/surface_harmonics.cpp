@@ -5,6 +5,7 @@
 #include <numbers>
 #include <vector>
 
+#include "precompute/base/parallel_loop.h"
 #include "precompute/outputs/harmonic_view.h"
 #include "precompute/sampling/hemisphere_rays.h"
 #include "rebounce/error.h"
@@ -82,14 +83,11 @@ SurfaceHarmonics trace_surface_harmonics(const TransferData& data,
     report_progress(progress, static_cast<double>(first) / static_cast<double>(n));
     const std::size_t count = std::min(kPatchBatch, n - first);
     views.resize(count);
-#pragma omp parallel
-    {
-      PatchViewer viewer(data.mesh, shown_patch, tracer, settings);
-#pragma omp for schedule(dynamic, 4)
-      for (std::size_t k = 0; k < count; ++k) {
-        views[k] = viewer.look_up(triangles[first + k], static_cast<std::uint32_t>(first + k));
-      }
-    }
+    parallel_loop(
+        count, 4, [&] { return PatchViewer(data.mesh, shown_patch, tracer, settings); },
+        [&](std::size_t k, PatchViewer& viewer) {
+          views[k] = viewer.look_up(triangles[first + k], static_cast<std::uint32_t>(first + k));
+        });
     for (const PatchView& view : views) {
       append_view(view, "the patches see too much for one file; ask for fewer rays of each",
                   harmonics);

@@ -98,19 +98,19 @@ void HemisphereCounts::trace(std::span<const double> count, std::uint64_t seed,
   const std::size_t n = count.size();
   const Ranks ranks;
   ParallelProgress loop(progress, n);
-#pragma omp parallel
-  {
-    EscapeScratch scratch;
+  struct Scratch {
+    EscapeScratch escape;
     MetPatchCounter counter;
-#pragma omp for schedule(dynamic, 16)
-    for (std::uint32_t i = 0; i < n; ++i) {
-      if (loop.stopped() || count[i] == 0 || !ranks.makes(i)) continue;
-      Escape escape = measure_escape(model_.mesh, model_.shown_patch, triangles_[i], i, tracer_,
-                                     static_cast<int>(count[i]), seed, scratch);
-      keep(i, std::move(escape), counter.count(n, scratch.met));
-      loop.advance();
-    }
-  }
+  };
+  parallel_loop(
+      n, 16, [] { return Scratch(); },
+      [&](std::uint32_t i, Scratch& scratch) {
+        if (loop.stopped() || count[i] == 0 || !ranks.makes(i)) return;
+        Escape escape = measure_escape(model_.mesh, model_.shown_patch, triangles_[i], i, tracer_,
+                                       static_cast<int>(count[i]), seed, scratch.escape);
+        keep(i, std::move(escape), scratch.counter.count(n, scratch.escape.met));
+        loop.advance();
+      });
   loop.finish();
   for (const double c : count) traced_ += static_cast<std::uint64_t>(c);
 }

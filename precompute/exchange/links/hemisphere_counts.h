@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "precompute/base/parallel_loop.h"
 #include "precompute/base/progress.h"
 #include "precompute/exchange/pairs/escape.h"
 #include "precompute/exchange/pairs/hemisphere_exchange.h"
@@ -34,37 +35,27 @@ class HemisphereCounts {
   template <typename Visit>
   void for_each_patch(const Visit& visit) const {
     const Ranks ranks;
-#pragma omp parallel
-    {
-      std::vector<MetPatch> met;
-#pragma omp for schedule(dynamic, 16)
-      for (std::uint32_t i = 0; i < first_.size(); ++i) {
-        if (!ranks.makes(i)) continue;
-        met.clear();
-        unpack(first_[i], met);
-        visit(i, std::span<const MetPatch>(met));
-        if (further_[i].empty()) continue;
-        met.clear();
-        unpack(further_[i], met);
-        visit(i, std::span<const MetPatch>(met));
-      }
-    }
+    using Met = std::vector<MetPatch>;
+    parallel_loop(
+        first_.size(), 16, [] { return Met(); },
+        [&](std::uint32_t i, Met& met) {
+          if (!ranks.makes(i)) return;
+          met.clear();
+          unpack(first_[i], met);
+          visit(i, std::span<const MetPatch>(met));
+          if (further_[i].empty()) return;
+          met.clear();
+          unpack(further_[i], met);
+          visit(i, std::span<const MetPatch>(met));
+        });
   }
 
   /// Of the first rays [n].
-  std::span<const Escape> escape() const {
-    return escape_;
-  }
+  std::span<const Escape> escape() const { return escape_; }
   /// All rays of each patch [n].
-  const std::vector<double>& rays() const {
-    return rays_;
-  }
-  int first_rays() const {
-    return first_rays_;
-  }
-  std::uint64_t traced_rays() const {
-    return traced_;
-  }
+  const std::vector<double>& rays() const { return rays_; }
+  int first_rays() const { return first_rays_; }
+  std::uint64_t traced_rays() const { return traced_; }
   std::uint64_t held_bytes() const;
 
  private:

@@ -4,7 +4,9 @@
 #include <array>
 #include <atomic>
 #include <tuple>
+#include <utility>
 
+#include "precompute/base/parallel_loop.h"
 #include "precompute/base/parallel_progress.h"
 
 namespace rebounce {
@@ -66,19 +68,17 @@ std::uint64_t LeafLinks::measure(const PairExchange& exchange, int probe_rays,
   std::size_t pairs = 0;
   for (std::uint32_t i = 0; i < rows; ++i) pairs += ranks.makes(i) ? row(i).size() : 0;
   ParallelProgress loop(progress, pairs);
-  std::uint64_t rays = 0;
-#pragma omp parallel reduction(+ : rays)
-  {
-    Scratch scratch;
-#pragma omp for schedule(dynamic, 4)
-    for (std::uint32_t i = 0; i < rows; ++i) {
-      if (loop.stopped() || !ranks.makes(i)) continue;
-      measure_row(i, exchange, probe_rays, scratch);
-      loop.advance(row(i).size());
-    }
-    rays += scratch.pairs.ray_count;
-  }
+  std::atomic<std::uint64_t> traced = 0;
+  parallel_loop(
+      rows, 4, [] { return Scratch(); },
+      [&](std::uint32_t i, Scratch& scratch) {
+        if (loop.stopped() || !ranks.makes(i)) return;
+        measure_row(i, exchange, probe_rays, scratch);
+        traced += std::exchange(scratch.pairs.ray_count, 0);
+        loop.advance(row(i).size());
+      });
   loop.finish();
+  std::uint64_t rays = traced;
   share_measured(ranks);
   ranks.add_up(std::span(&rays, 1));
   return rays;

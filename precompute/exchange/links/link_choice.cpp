@@ -4,6 +4,7 @@
 #include <limits>
 #include <span>
 
+#include "precompute/base/parallel_loop.h"
 #include "precompute/base/parallel_progress.h"
 #include "precompute/base/ranks.h"
 
@@ -212,16 +213,13 @@ std::vector<std::vector<AffineLink>> choose_links(const SpreadTree& tree, const 
   links[blocks.size()] = links_to_themselves(tree, pairs);
   const Ranks ranks;
   ParallelProgress finished(progress, blocks.size());
-#pragma omp parallel
-  {
-    BlockFitting fitting(tree, pairs, patches, multiplier);
-#pragma omp for schedule(dynamic, 1)
-    for (std::size_t k = 0; k < blocks.size(); ++k) {
-      if (finished.stopped() || !ranks.makes(k)) continue;
-      links[k] = fitting.fit(blocks[k]);
-      finished.advance();
-    }
-  }
+  parallel_loop(
+      blocks.size(), 1, [&] { return BlockFitting(tree, pairs, patches, multiplier); },
+      [&](std::size_t k, BlockFitting& fitting) {
+        if (finished.stopped() || !ranks.makes(k)) return;
+        links[k] = fitting.fit(blocks[k]);
+        finished.advance();
+      });
   finished.finish();
   share(ranks, std::span(links).first(blocks.size()));
   return links;

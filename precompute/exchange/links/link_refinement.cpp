@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "precompute/base/parallel_loop.h"
 #include "precompute/base/ranks.h"
 #include "rebounce/error.h"
 #include "runtime/rays/float3_glm.h"
@@ -202,20 +203,21 @@ void LinkRefinement::decide(std::span<const Candidate> generation, std::vector<O
                             const Progress& progress, double done) {
   const Ranks ranks;
   std::atomic<bool> stop = false;
-  std::uint64_t rays = 0;
-#pragma omp parallel reduction(+ : rays)
-  {
-    Scratch scratch{PairKernel(tree_, shadow_rays_), {}};
-#pragma omp for schedule(dynamic, 64)
-    for (std::size_t k = 0; k < generation.size(); ++k) {
-      if (stop || !ranks.makes(k, kPairsInTurn)) continue;
-      outcomes[k] = decide(generation[k], scratch);
-      const bool tells = progress && omp_get_thread_num() == 0 && k % 64 == 0;
-      if (tells && !progress(std::min(done, 1.0))) stop = true;
-    }
-    rays += scratch.ray_count;
-  }
+  std::atomic<std::uint64_t> traced = 0;
+  parallel_loop(
+      generation.size(), 64,
+      [&] {
+        return Scratch{PairKernel(tree_, shadow_rays_), {}};
+      },
+      [&](std::size_t k, Scratch& scratch) {
+        if (stop || !ranks.makes(k, kPairsInTurn)) return;
+        outcomes[k] = decide(generation[k], scratch);
+        if (scratch.ray_count > 0) traced += std::exchange(scratch.ray_count, 0);
+        const bool tells = progress && omp_get_thread_num() == 0 && k % 64 == 0;
+        if (tells && !progress(std::min(done, 1.0))) stop = true;
+      });
   if (stop) throw Cancelled();
+  std::uint64_t rays = traced;
   ranks.share(std::span(outcomes), kPairsInTurn);
   ranks.add_up(std::span(&rays, 1));
   ray_count_ += rays;

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <optional>
 
+#include "precompute/base/parallel_loop.h"
 #include "precompute/base/parallel_progress.h"
 #include "precompute/exchange/pairs/adaptive_row_sampling.h"
 #include "precompute/exchange/pairs/hemisphere_exchange.h"
@@ -126,16 +127,13 @@ class RawExchangeBuilder {
   void for_each_patch(std::span<const std::uint32_t> patches, const Work& work, const Part& part) {
     const Progress whole = [&](double done) { return !progress_ || progress_(part(done)); };
     ParallelProgress loop(whole, patches.size());
-#pragma omp parallel
-    {
-      Scratch scratch;
-#pragma omp for schedule(dynamic, 4)
-      for (std::size_t k = 0; k < patches.size(); ++k) {
-        if (loop.stopped()) continue;
-        work(patches[k], scratch);
-        loop.advance();
-      }
-    }
+    parallel_loop(
+        patches.size(), 4, [] { return Scratch(); },
+        [&](std::size_t k, Scratch& scratch) {
+          if (loop.stopped()) return;
+          work(patches[k], scratch);
+          loop.advance();
+        });
     loop.finish();
   }
 

@@ -1,9 +1,11 @@
 #include "precompute/base/parallel_loop.h"
 
 #include <gtest/gtest.h>
+#include <omp.h>
 
 #include <atomic>
 #include <new>
+#include <numeric>
 #include <vector>
 
 namespace rebounce::test_parallel_loop {
@@ -27,6 +29,32 @@ TEST(ParallelLoop, ThrowsWhatACallThrowsAndLeavesOutTheRest) {
   EXPECT_THROW(run(), std::bad_alloc);
   EXPECT_GE(calls, 1);
   EXPECT_LT(calls, 100'000);
+}
+
+TEST(ParallelLoop, MakesAScratchOnceForEachThread) {
+  std::atomic<int> made = 0;
+  std::vector<int> calls(1000, 0), scratches(1000, 0);
+  parallel_loop(
+      calls.size(), 16,
+      [&] {
+        return std::vector<int>{made++, 0};
+      },
+      [&](std::size_t k, std::vector<int>& scratch) {
+        ++calls[k];
+        scratches[scratch[0]] = ++scratch[1];
+      });
+  EXPECT_EQ(calls, std::vector<int>(1000, 1));
+  EXPECT_GE(made, 1);
+  EXPECT_LE(made, omp_get_max_threads());
+  EXPECT_EQ(std::accumulate(scratches.begin(), scratches.end(), 0), 1000);
+  parallel_loop(
+      0, 16, [&] { return ++made; }, [](std::size_t, int) { FAIL(); });
+}
+
+TEST(ParallelLoop, ThrowsWhatAScratchThrows) {
+  const auto make = []() -> int { throw std::bad_alloc(); };
+  const auto run = [&] { parallel_loop(100, 4, make, [](std::size_t, int) { FAIL(); }); };
+  EXPECT_THROW(run(), std::bad_alloc);
 }
 
 }  // namespace
