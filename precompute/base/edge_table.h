@@ -3,13 +3,26 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <numeric>
 #include <span>
+#include <string>
 #include <vector>
 
+#include "rebounce/error.h"
 #include "rebounce/types.h"
 
 namespace rebounce {
+
+/// The most triangles of a mesh: their sides are numbered by 32 bits.
+inline constexpr std::size_t kMostTriangles = std::numeric_limits<std::uint32_t>::max() / 3;
+
+/// Throws Error if a mesh has more than kMostTriangles.
+inline void check_triangle_count(std::size_t count) {
+  if (count <= kMostTriangles) return;
+  throw Error("a mesh may have at most " + std::to_string(kMostTriangles) + " triangles, not " +
+              std::to_string(count) + "; simplify the scene or ask for fewer or larger patches");
+}
 
 /// One side of a triangle, stored with the edge that it lies on.
 class HalfEdge {
@@ -39,11 +52,12 @@ class EdgeTable {
  public:
   EdgeTable() = default;
 
-  /// Triangles [0, `count`), fewer than 2^31, have the corners corner(t), all below `end_count`.
-  /// Sides without length are left out.
+  /// Triangles [0, `count`) have the corners corner(t), all below `end_count`. Sides without length
+  /// are left out. Throws Error if there are more than kMostTriangles.
   template <typename Corner>
-  EdgeTable(std::uint32_t count, std::uint32_t end_count, const Corner& corner)
+  EdgeTable(std::size_t count, std::uint32_t end_count, const Corner& corner)
       : begin_(std::size_t{end_count} + 1, 0) {
+    check_triangle_count(count);
     for_each_side(count, corner, [&](std::uint32_t low, HalfEdge) { ++begin_[low + 1]; });
     std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
     half_edge_.resize(begin_.back());
@@ -86,7 +100,7 @@ class EdgeTable {
 
  private:
   template <typename Corner, typename Visit>
-  static void for_each_side(std::uint32_t count, const Corner& corner, const Visit& visit) {
+  static void for_each_side(std::size_t count, const Corner& corner, const Visit& visit) {
     for (std::uint32_t t = 0; t < count; ++t) {
       const Uint3 ends = corner(t);
       for (int k = 0; k < 3; ++k) {

@@ -10,7 +10,7 @@
 #include "precompute/compression/matrix_free_plan.h"
 #include "precompute/exchange/pairs/closure.h"
 #include "precompute/exchange/pairs/form_factors.h"
-#include "rebounce/error.h"
+#include "runtime/rays/triangle.h"
 #include "transfer/base/machine_memory.h"
 #include "transfer/exchange/linked_form_factors.h"
 
@@ -70,6 +70,13 @@ constexpr std::size_t kLinkBytesKept = kFlatLinkBytes + LinkedFormFactors::kByte
 // and grows with the patches up to a limit (lab/137).
 constexpr double kMoreLinksOfPatch = 1.0 / 12'000, kMostMoreLinks = 0.6;
 
+// Patches of flat surfaces for each square of their largest length, which is the diagonal of the
+// box around them.
+constexpr double kPatchesOfSquare = 2;
+
+// More patches than any build has room for.
+constexpr double kNoRoom = 1e15;
+
 // A patch beside links: compressed form factors and what they are fitted to, without the lights.
 constexpr std::size_t kPatchBytes = 3000;
 
@@ -83,6 +90,21 @@ CostEstimate estimate_of(std::size_t patch_count, const PatchRoles& roles) {
   estimate.receiver_count = roles.count(PatchRoles::kReceiver, patch_count);
   estimate.source_count = roles.count(PatchRoles::kSource, patch_count);
   return estimate;
+}
+
+/// The number of patches that the settings ask for; from a size at least those of the triangles
+/// that are larger than its square.
+double least_patch_count(const Scene& scene, const SubdivisionSettings& settings) {
+  const double wanted =
+      settings.patch_count > 0 ? static_cast<double>(settings.patch_count) : kNoRoom;
+  const double size = settings.patch_size;
+  if (size == 0) return std::min(wanted, kNoRoom);
+  double area = 0;
+  for (std::uint32_t t = 0; t < scene.triangle.size(); ++t) {
+    const double of_triangle = area_of(corners_of(scene, t));
+    if (of_triangle > size * size) area += of_triangle;
+  }
+  return std::min({wanted, kNoRoom, kPatchesOfSquare * area / (size * size)});
 }
 
 std::uint64_t bytes_beside_transfer(const LinkedBuild& build) {
@@ -228,6 +250,15 @@ void sample_pairs(const PatchModel& model, const RayTracer& tracer, const BuildS
                               measure_tile_speed(arithmetic_of(decided.operator_kind)));
 }
 
+CostEstimate least_cost(const Scene& scene, const SubdivisionSettings& settings) {
+  const auto count = static_cast<std::size_t>(least_patch_count(scene, settings));
+  CostEstimate estimate = estimate_of(count, {});
+  if (count <= kPairsPatchCount) return estimate;
+  estimate.peak_bytes =
+      peak_bytes_of_links({.scene = {count}, .held_bytes = resident_memory_bytes()});
+  return estimate;
+}
+
 CostEstimate estimate_after_links(const LinkedBuild& build, std::uint64_t limit_bytes) {
   CostEstimate estimate = estimate_of(build.scene.patch_count, build.roles);
   estimate.link_count = build.link_count;
@@ -248,7 +279,7 @@ void refuse_if_too_large(const CostEstimate& estimate, std::uint64_t limit_bytes
   if (estimate.peak_bytes <= limit_bytes) return;
   throw Error(fmt::format(
       "{} patches (from {} triangles) need about {}, the limit is {}; ask for "
-      "fewer patches, simplify the scene or raise the memory limit (--memory-limit)",
+      "fewer or larger patches, simplify the scene or raise the memory limit (--memory-limit)",
       estimate.patch_count, triangle_count, in_gib(estimate.peak_bytes), in_gib(limit_bytes)));
 }
 

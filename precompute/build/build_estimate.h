@@ -83,6 +83,11 @@ CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
 void sample_pairs(const PatchModel& model, const RayTracer& tracer, const BuildSettings& decided,
                   const Progress& progress, CostEstimate& estimate);
 
+/// The least that a build needs, known before its patches are made: the memory that links of as
+/// many patches take without a link. 0 for up to kPairsPatchCount patches: these are soon made, and
+/// then more is known.
+CostEstimate least_cost(const Scene& scene, const SubdivisionSettings& settings);
+
 /// The memory of the stages after links, once their number is known.
 CostEstimate estimate_after_links(const LinkedBuild& build, std::uint64_t limit_bytes);
 

@@ -39,6 +39,7 @@ ConformingMesh::ConformingMesh(Scene& scene) : scene_(scene) {
   WeldedPositions welded = weld_positions(scene.position);
   position_id_ = std::move(welded.id);
   position_count_ = welded.count;
+  check_triangle_count(scene.triangle.size());
   const auto count = static_cast<std::uint32_t>(scene.triangle.size());
   source_.resize(count);
   next_.resize(count);
@@ -113,6 +114,7 @@ std::uint32_t ConformingMesh::split_triangle(std::uint32_t t, int corner, std::u
   const std::uint32_t a = old[corner], b = old[(corner + 1) % 3], c = old[(corner + 2) % 3];
   const std::span<HalfEdge> bc = half_edges(edge(t, (corner + 1) % 3));
   const auto added = triangle_count();
+  check_triangle_count(std::size_t{added} + 1);
   scene_.triangle[t] = {a, middle, c};
   scene_.triangle.push_back({middle, b, c});
   scene_.triangle_material.push_back(scene_.triangle_material[t]);

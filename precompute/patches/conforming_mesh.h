@@ -28,7 +28,7 @@ class ConformingMesh {
   };
 
   /// `scene` is changed in place and must outlive the object. No triangle may have two corners at
-  /// the same position.
+  /// the same position. Throws Error, as does split_edge(), if there are more than kMostTriangles.
   explicit ConformingMesh(Scene& scene);
 
   const Scene& scene() const { return scene_; }

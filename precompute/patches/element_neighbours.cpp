@@ -41,8 +41,7 @@ Ray segment(const glm::vec3& from, const glm::vec3& to) {
 Pairs find_edge_neighbours(std::span<const Uint3> corner) {
   std::uint32_t end_count = 0;
   for (const Uint3& ends : corner) end_count = std::max(end_count, 1 + std::ranges::max(ends));
-  const EdgeTable edges(static_cast<std::uint32_t>(corner.size()), end_count,
-                        [&](std::uint32_t e) { return corner[e]; });
+  const EdgeTable edges(corner.size(), end_count, [&](std::uint32_t e) { return corner[e]; });
   Pairs pairs;
   edges.for_each([&](std::uint32_t /*low*/, std::span<const HalfEdge> sides) {
     for (std::size_t i = 0; i < sides.size(); ++i) {

@@ -46,7 +46,7 @@ std::vector<std::uint32_t> find_pieces(const Scene& scene, const WeldedPositions
     const auto& [a, b, c] = scene.triangle[t];
     return Uint3{place.id[a], place.id[b], place.id[c]};
   };
-  const EdgeTable edges(static_cast<std::uint32_t>(scene.triangle.size()), place.count, corner);
+  const EdgeTable edges(scene.triangle.size(), place.count, corner);
   DisjointSets sets(scene.triangle.size());
   edges.for_each([&](std::uint32_t /*low*/, std::span<const HalfEdge> sides) {
     const bool is_consistent = sides.size() == 2 && sides[0].ascends() != sides[1].ascends();

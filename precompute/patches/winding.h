@@ -31,8 +31,7 @@ struct InsideOutPiece {
 /// outwards, but also a single convex solid) is inside out as a whole. Closed solids, outer shells
 /// of rooms and posters on walls are not: their backs are not seen, or their fronts are seen too.
 ///
-/// Deterministic. The largest piece comes first. Throws Error if there is no memory for a ray
-/// tracer.
+/// Deterministic. The largest piece comes first.
 std::vector<InsideOutPiece> find_inside_out(const Scene& scene);
 
 /// Gives the triangles of `pieces` double-sided copies of their materials, and adds a warning to

@@ -51,8 +51,8 @@ enum class PassageDetail : std::uint8_t {
 class RayTracer {
  public:
   /// Builds the acceleration structure over all triangles. Indices must be in range. `opacity` may
-  /// cover more triangles than that; it is copied. Throws Error if Embree fails, for example out of
-  /// memory.
+  /// cover more triangles than that; it is copied. Throws Error if Embree fails,
+  /// std::bad_alloc if it is out of memory.
   RayTracer(std::span<const Float3> position, std::span<const Uint3> triangle,
             const OpacityMaps& opacity = {});
   ~RayTracer();

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstdint>
 #include <memory>
+#include <new>
 #include <string>
 #include <system_error>
 
@@ -19,6 +20,13 @@ namespace {
 
 [[noreturn]] void fail(const std::filesystem::path& path, const std::string& reason) {
   throw Error("cannot read " + path.string() + ": " + reason + "; check its name and permissions");
+}
+
+/// After a call that has failed. Throws std::bad_alloc if there was no memory for it, Error
+/// otherwise.
+[[noreturn]] void fail_by_errno(const std::filesystem::path& path) {
+  if (errno == ENOMEM) throw std::bad_alloc();
+  fail(path, std::generic_category().message(errno));
 }
 
 /// Throws Error if the machine has less memory than the file has bytes. All of them are read at
@@ -36,7 +44,7 @@ class Descriptor {
   explicit Descriptor(const std::filesystem::path& path)
       // O_NONBLOCK: a pipe is refused at once instead of waited for.
       : value_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {
-    if (value_ < 0) fail(path, std::generic_category().message(errno));
+    if (value_ < 0) fail_by_errno(path);
   }
   ~Descriptor() { ::close(value_); }
   Descriptor(const Descriptor&) = delete;
@@ -52,7 +60,7 @@ class Mapping {
   Mapping(const std::filesystem::path& path, const Descriptor& descriptor, std::size_t size)
       : address_(::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, descriptor.value(), 0)),
         size_(size) {
-    if (address_ == MAP_FAILED) fail(path, std::generic_category().message(errno));
+    if (address_ == MAP_FAILED) fail_by_errno(path);
   }
   ~Mapping() { ::munmap(address_, size_); }
   Mapping(const Mapping&) = delete;
@@ -71,9 +79,7 @@ class Mapping {
 SharedArray<std::byte> map_file(const std::filesystem::path& path) {
   const Descriptor descriptor(path);
   struct stat status {};
-  if (::fstat(descriptor.value(), &status) != 0) {
-    fail(path, std::generic_category().message(errno));
-  }
+  if (::fstat(descriptor.value(), &status) != 0) fail_by_errno(path);
   if (!S_ISREG(status.st_mode)) fail(path, "it is not a regular file");
   if (status.st_size == 0) return {};  // mmap does not map empty files
   check_memory_for(path, static_cast<std::uint64_t>(status.st_size));

@@ -6,11 +6,13 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <limits>
 #include <vector>
 
 #include "precompute/base/process_memory.h"
 #include "precompute/lights/fitting_lights.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/test_scenes.h"
 
 namespace rebounce::test_build_estimate {
 namespace {
@@ -118,6 +120,30 @@ TEST(BuildEstimate, RowsOfReceiversAreAStageOfTheirOwn) {
   EXPECT_NEAR(static_cast<double>(bytes(kFew)), static_cast<double>(bytes(0)), 1e6);
   EXPECT_GE(bytes(kMany), kMany);
   EXPECT_LE(bytes(kMany), bytes(0) + kMany);
+}
+
+TEST(BuildEstimate, OfPatchesIsKnownBeforeTheyAreMade) {
+  Scene scene = test::empty_scene();
+  test::add_box(scene, {0, 0, 0}, {4, 3, 5}, true);
+  const auto count_of = [&](const SubdivisionSettings& settings) {
+    return least_cost(scene, settings).patch_count;
+  };
+  const double area = 2 * (4 * 3 + 3 * 5 + 5 * 4);
+  EXPECT_EQ(count_of({.patch_count = 0, .patch_size = 8}), 0U) << "nothing is cut";
+  EXPECT_NEAR(static_cast<double>(count_of({.patch_count = 0, .patch_size = 0.25F})),
+              2 * area / 0.0625, 1);
+  EXPECT_EQ(count_of({.patch_count = 1000, .patch_size = 0.25F}), 1000U);
+  const PatchModel model = make_patch_model(scene, {.patch_count = 0, .patch_size = 0.25F});
+  EXPECT_GE(model.patches.size(), count_of({.patch_count = 0, .patch_size = 0.25F}));
+  EXPECT_LE(model.patches.size(), 4 * count_of({.patch_count = 0, .patch_size = 0.25F}));
+
+  EXPECT_EQ(least_cost(scene, {.patch_count = kPairsPatchCount}).peak_bytes, 0U);
+  EXPECT_GT(least_cost(scene, {.patch_count = 1'000'000}).peak_bytes, 10ULL << 30);
+  for (const SubdivisionSettings& endless :
+       {SubdivisionSettings{.patch_count = std::numeric_limits<std::size_t>::max()},
+        SubdivisionSettings{.patch_count = 0, .patch_size = 1e-40F}}) {
+    EXPECT_GT(least_cost(scene, endless).peak_bytes, 1ULL << 60);
+  }
 }
 
 TEST(BuildEstimate, IsRefusedAboveTheLimit) {

@@ -6,7 +6,9 @@
 #include <random>
 #include <set>
 
+#include "precompute/base/edge_table.h"
 #include "precompute/patches/welded_positions.h"
+#include "tests/support/expect_error.h"
 #include "tests/support/test_scenes.h"
 
 namespace rebounce::test_subdivision {
@@ -125,6 +127,16 @@ TEST(Subdivision, IsDeterministic) {
   subdivide(b, one_each(b), {.patch_count = 1500});
   EXPECT_EQ(a.position, b.position);
   EXPECT_EQ(a.triangle, b.triangle);
+}
+
+TEST(Subdivision, RefusesMeshesOfMoreTrianglesThanTheirSidesHaveNumbers) {
+  check_triangle_count(kMostTriangles);
+  const auto no_corner = [](std::uint32_t) { return Uint3{}; };
+  for (const std::size_t count : {kMostTriangles + 1, std::size_t{1} << 40U}) {
+    test::expect_error(
+        [&] { EdgeTable(count, 0, no_corner); },
+        "a mesh may have at most 1431655765 triangles, not " + std::to_string(count));
+  }
 }
 
 TEST(WeldedPositions, JoinsEqualPlacesOnly) {
