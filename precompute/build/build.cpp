@@ -68,7 +68,7 @@ class TransferBuild {
     report_.triangle_count = scene.triangle.size();
     report_.degenerate_triangle_count = scene.degenerate_triangle_count;
     report_.mesh_names = mesh_names(scene);
-    report_.warnings = scene.warnings;
+    report_.warnings.insert(report_.warnings.end(), scene.warnings.begin(), scene.warnings.end());
     receivers_ = PatchSelection(settings_.receivers, scene, "receivers");
     sources_ = PatchSelection(settings_.sources, scene, "sources");
     data_.materials = scene.materials;
@@ -91,6 +91,8 @@ class TransferBuild {
   /// Makes the patches. Throws Error if the rest needs more memory than allowed, or cannot be made
   /// with these settings.
   void make_patches(Scene scene) {
+    refuse_if_too_large(least_cost(scene, settings_.subdivision), memory_limit_bytes(settings_),
+                        report_.triangle_count);
     model_ = clock_.run("patches", [&](const Progress& part) {
       return make_patch_model(std::move(scene), settings_.subdivision, part);
     });
@@ -135,17 +137,16 @@ class TransferBuild {
     make_outputs(model_.shown_patch, *tracer_, decided_, data_, report_, clock_);
   }
 
-  /// Makes the operator and measures its error.
+  /// Makes the operator, measures its error and makes what needs it.
   void make_operator() {
     if (decided_.operator_kind == OperatorKind::kNoOperator) return;
     const bool links = decided_.exchange_source == ExchangeSource::kLinks;
-    if (links) {
-      make_operator_from_links(*tracer_, model_.shown_patch, decided_, roles_, data_, report_,
-                               clock_);
-    } else {
-      make_operator_from_pairs(*tracer_, decided_, roles_, data_, report_, clock_);
-    }
+    const std::vector<KindError> errors =
+        links ? make_operator_from_links(*tracer_, model_.shown_patch, decided_, roles_, data_,
+                                         report_, clock_)
+              : make_operator_from_pairs(*tracer_, decided_, roles_, data_, report_, clock_);
     make_outputs_of_operator(model_.shown_patch, *tracer_, decided_, data_, report_, clock_);
+    record_build(decided_, report_, errors, data_);
   }
 
   /// All that follows on the scene.

@@ -75,6 +75,9 @@ void check_settings(const BuildSettings& settings) {
           "the rank must be from 1 to 1000000");
   require(is_from(0, settings.form_factor_tolerance),
           "the tolerance of form factors must be at least 0");
+  require(
+      settings.operator_kind != OperatorKind::kNoOperator || settings.form_factor_tolerance == 0,
+      "form factors are compressed with an operator alone; make one, or store them whole");
   const auto& [nx, ny, nz] = settings.probes.grid;
   require((nx > 0) == (ny > 0) && (ny > 0) == (nz > 0),
           "a grid of probes needs a number along each of x, y and z");

@@ -109,9 +109,8 @@ std::string report_json(const BuildReport& report, const std::vector<KindError>&
 
 }  // namespace
 
-void record_build(const BuildSettings& decided, const BuildReport& report,
-                  const std::vector<KindError>& errors, TransferData& data) {
-  BuildRecord& record = data.record;
+void record_errors(const BuildSettings& decided, const std::vector<KindError>& errors,
+                   BuildRecord& record) {
   record.error_bound = 0;
   for (const KindError& e : errors) {
     record.error_bound = std::max(record.error_bound, e.bound);
@@ -120,6 +119,10 @@ void record_build(const BuildSettings& decided, const BuildReport& report,
     record.error_max = e.max;
   }
   record.tolerance = is_hierarchical(decided) ? decided.tolerance : 0;
+}
+
+void record_build(const BuildSettings& decided, const BuildReport& report,
+                  const std::vector<KindError>& errors, TransferData& data) {
   data.settings_json = settings_json(decided, report.form_factor_tolerance);
   data.report_json = report_json(report, errors);
 }

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "precompute/build/build_estimate.h"
-#include "precompute/build/build_record.h"
 #include "precompute/build/kept_tolerances.h"
 #include "precompute/build/operator_stage.h"
 #include "precompute/compression/form_factor_compression.h"
@@ -117,7 +116,7 @@ class LinkedOperator {
         links_(std::make_shared<const LinkedFormFactors>(data.links, data.patches.area,
                                                          data.patches.centroid)) {}
 
-  void make(std::span<const std::uint32_t> shown_patch) {
+  std::vector<KindError> make(std::span<const std::uint32_t> shown_patch) {
     FormFactorLinks fewer = clock_.run("fewer links", [&](const Progress& part) {
       return fit_links(data_.links, data_.patches, kErrorPerLink, part);
     });
@@ -136,7 +135,7 @@ class LinkedOperator {
     // The check is the last step that needs all of them.
     data_.links = decided_.store_links ? std::move(fewer) : FormFactorLinks{};
     if (decided_.store_links) report_.link_count = data_.links.pair.size();
-    record_build(decided_, report_, errors_, data_);
+    return std::move(errors_);
   }
 
  private:
@@ -202,7 +201,7 @@ class LinkedOperator {
       return measure_error(data_, tracer_, truth_of, seed, part,
                            [&](const auto&... light) { whole_->add(light...); });
     });
-    record_build(decided_, report_, errors_, data_);
+    record_errors(decided_, errors_, data_.record);
   }
 
   /// Makes the operator again from the bases that are there, for a smaller tolerance of the
@@ -234,10 +233,12 @@ class LinkedOperator {
 
 }  // namespace
 
-void make_operator_from_links(const RayTracer& tracer, std::span<const std::uint32_t> shown_patch,
-                              const BuildSettings& decided, const PatchRoles& roles,
-                              TransferData& data, BuildReport& report, PhaseClock& clock) {
-  LinkedOperator(tracer, decided, roles, data, report, clock).make(shown_patch);
+std::vector<KindError> make_operator_from_links(const RayTracer& tracer,
+                                                std::span<const std::uint32_t> shown_patch,
+                                                const BuildSettings& decided,
+                                                const PatchRoles& roles, TransferData& data,
+                                                BuildReport& report, PhaseClock& clock) {
+  return LinkedOperator(tracer, decided, roles, data, report, clock).make(shown_patch);
 }
 
 }  // namespace rebounce

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include "precompute/build/build_record.h"
 #include "precompute/build/kept_tolerances.h"
 #include "precompute/compression/form_factor_compression.h"
 #include "precompute/compression/hierarchical_transfer.h"
@@ -61,24 +60,26 @@ void compress_form_factors_of(TransferData& data, const TransferOperator& transf
 }
 
 /// Measures the error of the operator against `exact` or, if that is null, against an iterative
-/// solution. `seed`: of the lights.
-void check_operator(TransferData& data, const RayTracer& tracer, const DenseOperator* exact,
-                    const BuildSettings& decided, std::uint64_t seed, const BuildReport& report,
-                    PhaseClock& clock) {
-  const std::vector<KindError> errors = clock.run("check", [&](const Progress& part) {
+/// solution, and records it. `seed`: of the lights.
+std::vector<KindError> check_operator(TransferData& data, const RayTracer& tracer,
+                                      const DenseOperator* exact, const BuildSettings& decided,
+                                      std::uint64_t seed, PhaseClock& clock) {
+  std::vector<KindError> errors = clock.run("check", [&](const Progress& part) {
     if (data.transfer->roles().all_are_both()) {
       data.record.solve_residual = transfer_residual(*data.transfer, data.exchange, data.patches);
     }
     return measure_error(data, tracer, exact, seed, part);
   });
-  record_build(decided, report, errors, data);
+  record_errors(decided, errors, data.record);
+  return errors;
 }
 
 }  // namespace
 
-void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& decided,
-                              const PatchRoles& roles, TransferData& data, BuildReport& report,
-                              PhaseClock& clock) {
+std::vector<KindError> make_operator_from_pairs(const RayTracer& tracer,
+                                                const BuildSettings& decided,
+                                                const PatchRoles& roles, TransferData& data,
+                                                BuildReport& report, PhaseClock& clock) {
   const bool compressed = decided.operator_kind != OperatorKind::kDense;
   const Precision dense_precision = compressed ? Precision::kF32 : *decided.precision;
   const auto dense = clock.run("operator", [&](const Progress& part) {
@@ -100,15 +101,16 @@ void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& deci
     });
   }
   const std::uint64_t seed = decided.form_factors.seed;
-  check_operator(data, tracer, compressed ? dense.get() : nullptr, decided, seed, report, clock);
+  std::vector<KindError> errors =
+      check_operator(data, tracer, compressed ? dense.get() : nullptr, decided, seed, clock);
   const double finer = finer_tolerance(data.record);
-  if (finer == 0) return;
+  if (finer == 0) return errors;
   BuildSettings again = decided;
   again.tolerance = finer;
   data.transfer = clock.run("compression again", [&](const Progress& part) {
     return compress(*dense, data, tracer, again, roles, part);
   });
-  check_operator(data, tracer, dense.get(), decided, seed_of_second_check(seed), report, clock);
+  return check_operator(data, tracer, dense.get(), decided, seed_of_second_check(seed), clock);
 }
 
 }  // namespace rebounce

@@ -2,7 +2,9 @@
 
 #include <cstdint>
 #include <span>
+#include <vector>
 
+#include "precompute/build/build_record.h"
 #include "precompute/build/phase_clock.h"
 #include "precompute/inverse/dense_transfer.h"
 #include "rebounce/build_report.h"
@@ -14,9 +16,10 @@
 namespace rebounce {
 
 // The last stage of a build: makes the operator of `data`, whose patches, mesh and form factors are
-// complete, measures its error and records everything. `decided`: settings that leave nothing open.
-// `roles`: roles of the patches; anything but both for all patches needs a hierarchical operator.
-// Throws Error if the operator fails its own check, Cancelled if asked to stop.
+// complete, measures its error, records that, and returns it for record_build. `decided`: settings
+// that leave nothing open. `roles`: roles of the patches; anything but both for all patches needs a
+// hierarchical operator. Throws Error if the operator fails its own check, Cancelled if asked to
+// stop.
 
 /// The tolerance of the operator over that of the compressed form factors that it is made from.
 /// Their error adds to its own.
@@ -45,9 +48,10 @@ inline Arithmetic arithmetic_of(OperatorKind kind) {
 }
 
 /// Makes it from data.exchange, by a dense inverse.
-void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& decided,
-                              const PatchRoles& roles, TransferData& data, BuildReport& report,
-                              PhaseClock& clock);
+std::vector<KindError> make_operator_from_pairs(const RayTracer& tracer,
+                                                const BuildSettings& decided,
+                                                const PatchRoles& roles, TransferData& data,
+                                                BuildReport& report, PhaseClock& clock);
 
 /// Makes it from data.links, which are kept only on request. F is compressed, and the inverse is
 /// solved for without being stored as a whole (matrix_free_transfer.h). The error is measured
@@ -56,8 +60,10 @@ void make_operator_from_pairs(const RayTracer& tracer, const BuildSettings& deci
 /// is reduced by the fraction of the light that receivers get. How far links and operator together
 /// are from exact form factors is estimated by rays; `shown_patch` [t] is that of PatchModel. The
 /// memory limit of `decided` is for what comes on top of what the process held before links.
-void make_operator_from_links(const RayTracer& tracer, std::span<const std::uint32_t> shown_patch,
-                              const BuildSettings& decided, const PatchRoles& roles,
-                              TransferData& data, BuildReport& report, PhaseClock& clock);
+std::vector<KindError> make_operator_from_links(const RayTracer& tracer,
+                                                std::span<const std::uint32_t> shown_patch,
+                                                const BuildSettings& decided,
+                                                const PatchRoles& roles, TransferData& data,
+                                                BuildReport& report, PhaseClock& clock);
 
 }  // namespace rebounce

@@ -199,25 +199,27 @@ std::uint64_t memory_limit_of(double gib) {
                                  static_cast<std::uint64_t>(gib * static_cast<double>(1ULL << 30)));
 }
 
-/// The lamps of a light file as those of the scene; says what of it has no part in a build.
-std::vector<Light> own_lamps(const std::string& path, double scale, const CommonOptions& options) {
+/// The lamps of a light file as those of the scene; adds what of it has no part in a build to
+/// `warnings`.
+std::vector<Light> own_lamps(const std::string& path, double scale,
+                             std::vector<std::string>& warnings) {
   LightSetup setup = read_lights(path, scale);
   if (setup.sky.luminance > 0 || !setup.emitters.empty()) {
-    print_note(options, "warning: " + path +
-                            ": sky and emitters are no lamps of the scene, and are left out");
+    warnings.push_back(path + ": sky and emitters are no lamps of the scene, and are left out");
   }
   if (setup.lights.empty()) {
-    print_note(options, "warning: " + path + ": there is no lamp; the scene has none");
+    warnings.push_back(path + ": there is no lamp; the scene has none");
   }
   return std::move(setup.lights);
 }
 
-BuildSettings settings_of(const PrecomputeOptions& chosen, const CommonOptions& options) {
+/// The settings; adds what of the options has no part in a build to `warnings`.
+BuildSettings settings_of(const PrecomputeOptions& chosen, std::vector<std::string>& warnings) {
   BuildSettings settings = chosen.settings;
   parse_probes(chosen.probes, settings.probes);
   settings.receivers = split_lists(chosen.receivers);
   settings.sources = split_lists(chosen.sources);
-  if (!chosen.lights.empty()) settings.lights = own_lamps(chosen.lights, settings.scale, options);
+  if (!chosen.lights.empty()) settings.lights = own_lamps(chosen.lights, settings.scale, warnings);
   if (chosen.form_factors == "pairs") settings.exchange_source = ExchangeSource::kPairs;
   if (chosen.form_factors == "links") settings.exchange_source = ExchangeSource::kLinks;
   settings.form_factors = with_quality(quality_named(chosen.quality), settings.form_factors);
@@ -231,7 +233,7 @@ BuildSettings settings_of(const PrecomputeOptions& chosen, const CommonOptions& 
 
 TransferData build(const PrecomputeOptions& chosen, const CommonOptions& options,
                    BuildReport& report) {
-  const BuildSettings settings = settings_of(chosen, options);
+  const BuildSettings settings = settings_of(chosen, report.warnings);
   check_can_write(chosen.output);
   if (chosen.reader == "web") check_can_write(form_factor_file_beside(chosen.output));
   ProgressBar bar(!options.quiet);

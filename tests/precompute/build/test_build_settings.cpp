@@ -23,6 +23,11 @@ TEST(BuildSettings, OutOfRangeAreRefused) {
       {"the tolerance must be above 0", [](BuildSettings& s) { s.tolerance = 0; }},
       {"the tolerance must be above 0", [](BuildSettings& s) { s.tolerance = NAN; }},
       {"tolerance of form factors", [](BuildSettings& s) { s.form_factor_tolerance = -1; }},
+      {"compressed with an operator alone",
+       [](BuildSettings& s) {
+         s.operator_kind = OperatorKind::kNoOperator;
+         s.form_factor_tolerance = 0.01;
+       }},
       {"the rank must be",
        [](BuildSettings& s) {
          s.operator_kind = OperatorKind::kLowRank;

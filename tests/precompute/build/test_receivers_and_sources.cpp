@@ -4,6 +4,7 @@
 #include <omp.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "precompute/build/transfer_build.h"
 #include "precompute/compression/form_factor_compression.h"
@@ -66,6 +67,20 @@ TEST(ReceiversAndSources, ABuildKeepsItsToleranceForThem) {
     EXPECT_GT(data.record.error_mean, 0);
     EXPECT_LE(data.record.error_mean, 0.01);
     EXPECT_EQ(data.record.solve_residual, 0);
+  }
+}
+
+TEST(ReceiversAndSources, AllWarningsAreInTheFile) {
+  for (const ExchangeSource kind : {ExchangeSource::kPairs, ExchangeSource::kLinks}) {
+    BuildSettings settings = settings_of_rooms(kind);
+    settings.receiver_rows = {.at_vertices = true, .least_error = 0};
+    const Built built = build(settings);
+    const auto is_of_rows = [](const std::string& warning) {
+      return warning.find("vertices and texels with rows") != std::string::npos;
+    };
+    EXPECT_EQ(std::ranges::count_if(built.report.warnings, is_of_rows), 1);
+    const auto stored = nlohmann::json::parse(built.data.report_json)["warnings"];
+    EXPECT_EQ(stored.get<std::vector<std::string>>(), built.report.warnings);
   }
 }
 

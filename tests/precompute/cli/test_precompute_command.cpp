@@ -350,6 +350,13 @@ TEST_F(PrecomputeCommand, RefusesWhatNeedsTooMuchMemoryBeforeItBegins) {
                     "0.0001", "-o", path("x.safetensors")},
                    "the limit is 0.0001 GiB");
   }
+  // Their patches alone would take hours, and the memory of the machine.
+  for (const Words& patches : {Words{"--patch-size", "1e-6"}, Words{"--patches", "1000000"}}) {
+    SCOPED_TRACE(patches[0]);
+    expect_refused({"precompute", kScene, patches[0], patches[1], "--memory-limit", "2", "-o",
+                    path("x.safetensors")},
+                   "ask for fewer or larger patches");
+  }
 }
 
 TEST_F(PrecomputeCommand, StopsCleanlyWhenInterrupted) {
@@ -462,6 +469,8 @@ TEST_F(PrecomputeCommand, SaysWhatOfALightFileHasNoPartInABuild) {
   EXPECT_EQ(outcome.exit_code, test::kDone) << outcome.err;
   EXPECT_NE(outcome.err.find("sky and emitters are no lamps"), std::string::npos) << outcome.err;
   EXPECT_NE(outcome.err.find("there is no lamp"), std::string::npos) << outcome.err;
+  const json warnings = summary_of({"info", path("x.safetensors")})["report"]["warnings"];
+  EXPECT_EQ(warnings.size(), 2U) << warnings;
 }
 
 TEST_F(PrecomputeCommand, WritesForPagesPackedFilesAndFormFactorsApart) {
