@@ -103,17 +103,35 @@ export class Instance {
   }
 
   /** Copies `bytes` to new memory. */
-  put(bytes) {
+  #put(bytes) {
     const address = this.allocate(bytes.byteLength);
     new Uint8Array(this.#exports.memory.buffer, address, bytes.byteLength).set(bytes);
     return address;
   }
-  putTriple(numbers) {
-    return this.put(new Uint8Array(new Float32Array(numbers).buffer));
+  /**
+   * Calls `use` with the address of memory for each of `parts`, bytes to copy or a size, which is
+   * freed when it returns or throws.
+   */
+  lend(parts, use) {
+    const addresses = [];
+    try {
+      for (const part of parts) {
+        addresses.push(typeof part === 'number' ? this.allocate(part) : this.#put(part));
+      }
+      return use(...addresses);
+    } finally {
+      for (const address of addresses) this.release(address);
+    }
   }
-  putText(text) {
-    return this.put(this.#encoder.encode(`${text}\0`));
+
+  // Bytes to lend.
+  bytesOfFloats(numbers) {
+    return new Uint8Array(new Float32Array(numbers).buffer);
   }
+  bytesOfText(text) {
+    return this.#encoder.encode(`${text}\0`);
+  }
+
   text(address) {
     const bytes = new Uint8Array(this.#exports.memory.buffer);
     return this.#decoder.decode(bytes.slice(address, bytes.indexOf(0, address)));

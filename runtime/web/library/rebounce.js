@@ -73,17 +73,21 @@ export class Transfer {
 
   constructor(instance, buffer, name) {
     this.#instance = instance;
-    const bytes = instance.put(new Uint8Array(buffer));
-    const title = instance.putText(name);
-    const result = instance.allocate(4);
-    try {
+    const parts = [new Uint8Array(buffer), instance.bytesOfText(name), 4];
+    this.#address = instance.lend(parts, (bytes, title, result) => {
       instance.check('rebounce_transfer_read', bytes, buffer.byteLength, title, result);
-      this.#address = instance.words(result, 1)[0];
-    } finally {
-      for (const address of [bytes, title, result]) instance.release(address);
-    }
-    const file = readSafetensors(buffer);
+      return instance.words(result, 1)[0];
+    });
     this.name = name;
+    try {
+      this.#describe(readSafetensors(buffer));
+    } catch (error) {
+      this.dispose();
+      throw error;
+    }
+  }
+
+  #describe(file) {
     this.mesh = readMesh(file);
     this.materials = readMaterials(file);
     this.cameras = readCameras(file);
@@ -126,13 +130,13 @@ export class Transfer {
 /** One state of the light of a scene. */
 export class Engine {
   #instance;
-  #address;
+  #address = 0;
   #file;  // what messages call it
   #lights = { address: 0, capacity: 0 };
   #lightCount = 0;  // of the last frame
   #sky;
   #milliseconds;
-  #vertices;  // addresses, one for each of the results at vertices
+  #vertices = {};  // addresses, one for each of the results at vertices
   #patches;
   #chosen;
   #probes;
@@ -145,24 +149,30 @@ export class Engine {
     this.vertexCount = mesh.position.length / 3;
     /** Milliseconds of the stages of the last frame. */
     this.timings = { direct: 0, product: 0, vertices: 0, total: 0 };
-    const settings = instance.put(new Uint8Array(
-        new Uint32Array([16, pointsPerPatch, areaLightSamples, lightCapacity]).buffer));
-    const result = instance.allocate(4);
+    this.probeCount = probes?.valid.length ?? 0;
+    const settings = new Uint32Array([16, pointsPerPatch, areaLightSamples, lightCapacity]);
+    this.#address = instance.lend([new Uint8Array(settings.buffer), 4], (chosen, result) => {
+      instance.check('rebounce_engine_create', transfer, chosen, result);
+      return instance.words(result, 1)[0];
+    });
     try {
-      instance.check('rebounce_engine_create', transfer, settings, result);
-      this.#address = instance.words(result, 1)[0];
-    } finally {
-      instance.release(settings);
-      instance.release(result);
+      this.#allocate();
+      this.#makeRoom(lightCapacity);
+    } catch (error) {
+      this.dispose();
+      throw error;
     }
+  }
+
+  #allocate() {
+    const instance = this.#instance;
     this.#sky = instance.allocate(4 * 4);
     this.#milliseconds = instance.allocate(8 * stages.length);
-    const atVertices = () => instance.allocate(12 * this.vertexCount);
-    this.#vertices = { bounced: atVertices(), direct: atVertices(), chosen: atVertices() };
-    this.#patches = instance.allocate(12 * patchCount);
-    this.probeCount = probes?.valid.length ?? 0;
+    for (const name of ['bounced', 'direct', 'chosen']) {
+      this.#vertices[name] = instance.allocate(12 * this.vertexCount);
+    }
+    this.#patches = instance.allocate(12 * this.patchCount);
     this.#probes = instance.allocate(4 * probeFloats * this.probeCount + 1);
-    this.#makeRoom(lightCapacity);
   }
 
   #living() {
@@ -213,15 +223,11 @@ export class Engine {
   setSky(type, sunDirection, groundReflectance = 0.2) {
     const address = this.#living();
     const instance = this.#instance;
-    const sun = instance.putTriple(triple(sunDirection, 'setSky: sunDirection'));
-    const cells = instance.allocate(4 * skyCellCount);
-    try {
+    const direction = instance.bytesOfFloats(triple(sunDirection, 'setSky: sunDirection'));
+    instance.lend([direction, 4 * skyCellCount], (sun, cells) => {
       instance.check('rebounce_cie_sky', type, sun, groundReflectance, cells);
       instance.check('rebounce_engine_set_sky_distribution', address, cells);
-    } finally {
-      instance.release(sun);
-      instance.release(cells);
-    }
+    });
   }
 
   /**
@@ -231,17 +237,14 @@ export class Engine {
   skyPanorama(type, sunDirection, width, height, groundReflectance = 0.2) {
     this.#living();
     const instance = this.#instance;
-    const sun = instance.putTriple(triple(sunDirection, 'skyPanorama: sunDirection'));
-    const cells = instance.allocate(4 * skyCellCount);
-    const texels = instance.allocate(4 * width * height);
-    try {
+    const direction = instance.bytesOfFloats(triple(sunDirection, 'skyPanorama: sunDirection'));
+    const parts = [direction, 4 * skyCellCount, 4 * width * height];
+    return instance.lend(parts, (sun, cells, texels) => {
       instance.check('rebounce_cie_sky', type, sun, groundReflectance, cells);
       const [ground] = instance.floats(cells, 1);
       instance.check('rebounce_web_sky_panorama', type, sun, ground, width, height, texels);
       return instance.floats(texels, width * height).slice();
-    } finally {
-      for (const address of [sun, cells, texels]) instance.release(address);
-    }
+    });
   }
 
   /** From the next frame on, the sky is uniform. */
@@ -252,24 +255,19 @@ export class Engine {
   /** From the next frame on, the sky is uniform, and what is below the horizon `ground` times it. */
   setSkyAboveGround(ground) {
     const address = this.#living();
-    const cells = this.#instance.put(new Uint8Array(
-        new Float32Array(skyCellCount).fill(1).fill(ground, 0, 1).buffer));
-    try {
+    const parts = this.#instance.bytesOfFloats(Array(skyCellCount).fill(1).fill(ground, 0, 1));
+    this.#instance.lend([parts], (cells) => {
       this.#instance.check('rebounce_engine_set_sky_distribution', address, cells);
-    } finally {
-      this.#instance.release(cells);
-    }
+    });
   }
 
   /** From the next frame on, the surfaces of a material emit that of the scene times `scale`. */
   setEmissionScale(material, scale) {
     const address = this.#living();
-    const factors = this.#instance.putTriple(triple(scale, 'setEmissionScale: scale'));
-    try {
+    const numbers = this.#instance.bytesOfFloats(triple(scale, 'setEmissionScale: scale'));
+    this.#instance.lend([numbers], (factors) => {
       this.#instance.check('rebounce_engine_set_emission_scale', address, material, factors);
-    } finally {
-      this.#instance.release(factors);
-    }
+    });
   }
 
   #result(name) {
@@ -357,18 +355,19 @@ export class Solver {
     this.#file = name;
     this.patchCount = patchCount;
     this.vertexCount = mesh.position.length / 3;
-    const bytes = instance.put(new Uint8Array(buffer));
-    const title = instance.putText(name);
-    const result = instance.allocate(4);
-    try {
+    const parts = [new Uint8Array(buffer), instance.bytesOfText(name), 4];
+    this.#address = instance.lend(parts, (bytes, title, result) => {
       instance.check('rebounce_web_solver_create', transfer, bytes, buffer.byteLength, title, result);
-      this.#address = instance.words(result, 1)[0];
-    } finally {
-      for (const address of [bytes, title, result]) instance.release(address);
+      return instance.words(result, 1)[0];
+    });
+    try {
+      this.#result = instance.allocate(2 * 8);
+      this.#vertices = instance.allocate(12 * this.vertexCount);
+      this.#patches = instance.allocate(12 * patchCount);
+    } catch (error) {
+      this.dispose();
+      throw error;
     }
-    this.#result = instance.allocate(2 * 8);
-    this.#vertices = instance.allocate(12 * this.vertexCount);
-    this.#patches = instance.allocate(12 * patchCount);
   }
 
   #living() {

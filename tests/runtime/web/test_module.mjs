@@ -206,6 +206,44 @@ test('a file that is damaged is refused with a reason', async () => {
   await assert.rejects(load(new TextEncoder().encode('<html>Not found</html>')), RebounceError);
 });
 
+test('what is made is freed where memory ends before it is kept', async (t) => {
+  const instance = await Instance.get();
+  const transfer = await Transfer.load(ofPage('cornell_box.safetensors'));
+  const engine = transfer.createEngine();
+  const { call } = instance;
+  const frees = /^(free|.*_(destroy|release))$/, makes = /^(malloc|.*_(create|read))$/;
+  let held = 0, left = Infinity;  // objects and pieces of memory, and pieces that there are yet
+  const { mock } = t.mock.method(instance, 'call', (name, ...args) => {
+    if (name === 'malloc' && --left < 0) return 0;
+    const result = call.call(instance, name, ...args);
+    if (name === 'malloc' || (makes.test(name) && result === 0)) ++held;
+    if (frees.test(name) && args[0]) --held;
+    return result;
+  });
+  for (const [make, least] of [
+    [() => transfer.createEngine(), 9],
+    [() => transfer.loadSolver(ofPage('cornell_box.form_factors.safetensors')), 6],
+    [() => Transfer.load(ofPage('cornell_box.safetensors')), 3],
+    [async () => engine.setSky(12, [0, -1, 0]), 2],
+  ]) {
+    held = 0;
+    let failures = -1, made;
+    do {
+      left = ++failures;
+      made = await Promise.resolve().then(make).catch((error) => {
+        assert.match(error.message, /out of memory/);
+        assert.equal(held, 0, `${failures} pieces`);
+        return error;
+      });
+    } while (made instanceof Error);
+    assert.ok(failures >= least, `${failures} pieces`);
+    made?.dispose();
+    assert.equal(held, 0);
+  }
+  mock.restore();
+  for (const one of [engine, transfer]) one.dispose();
+});
+
 test('600 frames and 20 loads take no further memory', async () => {
   const instance = await Instance.get();
   const transfer = await load();
