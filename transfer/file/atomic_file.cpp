@@ -180,7 +180,8 @@ void AtomicFile::commit() {
   if (const int error = sync(written, 0)) fail(target_, error);
   if (::rename(written.c_str(), target_.c_str()) != 0) fail(target_, errno);
   const fs::path folder = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
-  if (const int error = sync(folder, O_DIRECTORY)) fail(target_, error);
+  const int error = sync(folder, O_DIRECTORY);
+  if (error != 0 && error != EACCES) fail(target_, error);  // EACCES: it may not be opened to read
 }
 
 }  // namespace rebounce

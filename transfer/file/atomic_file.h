@@ -30,8 +30,8 @@ class AtomicFile {
   /// Appends `bytes`. Throws Error if the disk is full or fails.
   void write(std::span<const std::byte> bytes);
 
-  /// Flushes the file, renames it and flushes the folder. Call it once, last. Throws Error if one
-  /// of these fails.
+  /// Flushes the file, renames it and flushes the folder, if that may be read. Call it once, last.
+  /// Throws Error if one of these fails.
   void commit();
 
  private:

@@ -1,5 +1,7 @@
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <stdexcept>
 
@@ -149,6 +151,26 @@ TEST(AtomicFile, TakesWhatALibraryWrote) {
     test::write_bytes(given_up.path_for_library(), "half");
   }
   EXPECT_EQ(folder.names(), Names{"file"});
+}
+
+TEST(AtomicFile, NeedsNoRightToListTheFolder) {
+  namespace fs = std::filesystem;
+  const test::TemporaryFolder folder;
+  fs::permissions(folder.path(), fs::perms::all);
+  fs::create_directory(folder / "box");
+  fs::permissions(folder / "box", fs::perms(0333));
+  const uid_t user = ::geteuid();
+  constexpr uid_t kNobody = 65534;
+  ASSERT_EQ(::seteuid(user == 0 ? kNobody : user), 0);  // the superuser may read anything
+  EXPECT_LT(::open((folder / "box").c_str(), O_RDONLY | O_DIRECTORY), 0);
+  EXPECT_NO_THROW({
+    AtomicFile file(folder / "box/file");
+    file.write(bytes_of("new"));
+    file.commit();
+  });
+  ASSERT_EQ(::seteuid(user), 0);
+  fs::permissions(folder / "box", fs::perms::all);
+  EXPECT_EQ(test::read_bytes(folder / "box/file"), "new");
 }
 
 TEST(AtomicFile, HasTheRightsOfAnOrdinaryFile) {
