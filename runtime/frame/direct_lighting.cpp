@@ -120,4 +120,15 @@ void DirectLighting::add_up(const Sky& sky, std::size_t block,
   }
 }
 
+std::size_t DirectLighting::strongest_light(std::size_t patch) const {
+  const auto slot = std::ranges::find(receivers_->patch, patch) - receivers_->patch.begin();
+  const auto given = [&](const LightResponse& response) {
+    const glm::vec3 intensity = response.intensity;
+    const float most = std::max({intensity.x, intensity.y, intensity.z});
+    return most > 0 ? most * response.irradiance[static_cast<std::size_t>(slot)] : 0;
+  };
+  const auto lights = std::span(responses_).first(light_count_);
+  return static_cast<std::size_t>(std::ranges::max_element(lights, {}, given) - lights.begin());
+}
+
 }  // namespace rebounce

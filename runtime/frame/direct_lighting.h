@@ -48,6 +48,9 @@ class DirectLighting {
   void compute(std::span<const Light> lights, const Sky& sky, std::span<Float3> direct_irradiance,
                const Scheduler& scheduler = {});
 
+  /// The number of that light of the last compute(), of one or more, which gives most to a patch.
+  std::size_t strongest_light(std::size_t patch) const;
+
   /// The number of lights that the last compute() traced: new and changed ones.
   int traced_light_count() const { return traced_light_count_; }
 

@@ -1,6 +1,7 @@
 #include "runtime/frame/engine_parts.h"
 
 #include <algorithm>
+#include <optional>
 #include <string>
 
 #include "rebounce/error.h"
@@ -12,6 +13,27 @@
 
 namespace rebounce {
 namespace {
+
+// In lx. What patches send on adds up in single precision, and up to here no sum overflows.
+constexpr float kMostLight = 1e30F;
+
+bool is_too_much(const Float3& light) {
+  return !std::ranges::all_of(light, [](float x) { return x <= kMostLight; });
+}
+
+/// The first patch that gets more than a frame can take, or what is no number.
+std::optional<std::size_t> overexposed_patch(std::span<const Float3> irradiance) {
+  unsigned bad = 0;  // without a branch for each
+  for (const Float3& e : irradiance) {
+    for (const float x : e) bad |= x <= kMostLight ? 0U : 1U;
+  }
+  if (bad == 0) return std::nullopt;
+  return std::ranges::find_if(irradiance, is_too_much) - irradiance.begin();
+}
+
+std::string too_much_light(std::size_t patch) {
+  return "the direct irradiance of patch " + std::to_string(patch) + " is above 1e30 lx";
+}
 
 std::shared_ptr<const TransferData> checked(std::shared_ptr<const TransferData> data) {
   if (!data) throw Error("there are no transfer data; load a file first");
@@ -53,6 +75,7 @@ Engine::Parts::Parts(std::shared_ptr<const TransferData> transfer_data,
       std::make_shared<const std::vector<std::uint32_t>>(find_emitting_material(*data));
   emitted_exitance = data->patches.emitted_exitance;
   direct_irradiance.resize(n);
+  arriving.resize(n);
   initial_exitance.resize(n);
   indirect_irradiance.resize(n);
   radiosity.resize(n);
@@ -87,7 +110,14 @@ Engine::Engine(Engine&& other) noexcept = default;
 Engine& Engine::operator=(Engine&& other) noexcept = default;
 
 void Engine::Parts::compute_direct(std::span<const Light> lights, const Sky& frame_sky) {
-  direct_lighting->compute(lights, frame_sky, direct_irradiance, scheduler);
+  direct_lighting->compute(lights, frame_sky, arriving, scheduler);
+  if (const auto patch = overexposed_patch(arriving)) {
+    const bool by_sky = is_too_much(sky_irradiance(*data, frame_sky, *patch));
+    const std::string source =
+        by_sky ? "the sky" : "light " + std::to_string(direct_lighting->strongest_light(*patch));
+    throw Error(source + " is too bright: " + too_much_light(*patch));
+  }
+  std::ranges::copy(arriving, direct_irradiance.begin());
   sky = frame_sky;
 }
 
@@ -104,6 +134,7 @@ void Engine::relight(std::span<const Float3> direct_irradiance) {
   const OneThread guard(parts_->use);
   check_size("the direct irradiance", direct_irradiance.size(), parts_->direct_irradiance.size());
   check_light_of_patches("the direct irradiance", direct_irradiance);
+  if (const auto patch = overexposed_patch(direct_irradiance)) throw Error(too_much_light(*patch));
   std::ranges::copy(direct_irradiance, parts_->direct_irradiance.begin());
   parts_->sky = {};
   parts_->compute_initial_exitance();
@@ -130,7 +161,9 @@ void Engine::set_emission_scale(std::uint32_t material, const Float3& scale) {
     }
   };
   for_each([&](std::size_t i) {
-    if (!is_light(scaled(i))) throw Error("a scale of emission makes light that is not finite");
+    if (!is_light(scaled(i)) || is_too_much(scaled(i))) {
+      throw Error("a scale of emission makes light that is not finite or above 1e30 lx");
+    }
   });
   for_each([&](std::size_t i) { parts_->emitted_exitance[i] = scaled(i); });
 }

@@ -47,7 +47,7 @@ struct Engine::Parts {
   Parts& operator=(const Parts&) = delete;
 
   // The stages of a frame. `lights` are within their ranges; the first stage throws as check_sky
-  // does.
+  // does, and if more light arrives at a patch than a frame can take. Nothing has changed then.
   void compute_direct(std::span<const Light> lights, const Sky& frame_sky);
   void compute_initial_exitance();
   void apply_transfer();
@@ -62,6 +62,7 @@ struct Engine::Parts {
   Sky sky;                                                              ///< of the last frame
   std::vector<Float3> emitted_exitance;
   std::vector<Float3> direct_irradiance, initial_exitance, indirect_irradiance, radiosity;
+  std::vector<Float3> arriving;  ///< direct irradiance of a frame that may be refused
   std::vector<float> workspace;
 
   // What outputs of a frame (outputs.h) need to be made.

@@ -60,15 +60,15 @@ std::vector<std::string> lamp_warnings(const Engine& engine, std::span<const Lig
   check_lights(lights);
   std::vector<std::string> warnings;
   const DisplayMesh& mesh = engine.data().mesh;
-  Engine alone(engine);
+  DirectLighting alone(*engine.parts().direct_lighting);
+  std::vector<Float3> direct(engine.direct_irradiance().size());
   for (std::size_t k = 0; k < lights.size(); ++k) {
     const Light& light = lights[k];
     if (light.intensity == 0 || light.color == Float3{0, 0, 0}) continue;
-    alone.parts().compute_direct({&light, 1}, {});
-    const bool lights_something =
-        std::ranges::any_of(alone.direct_irradiance(), [](const Float3& e) {
-          return e != Float3{0, 0, 0};
-        });
+    alone.compute({&light, 1}, {}, direct, engine.scheduler());
+    const bool lights_something = std::ranges::any_of(direct, [](const Float3& e) {
+      return e != Float3{0, 0, 0};
+    });
     const bool has_place = lamp_kind(light.type).has_place();
     const double backs =
         has_place ? part_of_backs(mesh, *engine.parts().tracer, light.position) : 0;

@@ -290,13 +290,15 @@ rebounce_status rebounce_engine_clone(const rebounce_engine* engine, rebounce_en
 void rebounce_engine_destroy(rebounce_engine* engine);
 
 /* One frame. Lights are known by their number: one that is as it was is not traced again, nor one
- * that has only another colour or intensity. `sky` may be NULL: none. A light out of its range is
- * refused with its number. A frame that fails changes nothing. */
+ * that has only another colour or intensity. `sky` may be NULL: none. A light out of its range, or
+ * so bright that more than 1e30 lx arrive, is refused with its number. A frame that fails changes
+ * nothing. */
 rebounce_status rebounce_engine_relight(rebounce_engine* engine, const rebounce_light* lights,
                                         size_t light_count, const rebounce_sky* sky);
 
-/* One frame with a direct irradiance [patch_count][3] in lx of the caller's own. What is negative
- * or no finite number is refused with the index of its patch; the last frame then stays. */
+/* One frame with a direct irradiance [patch_count][3] in lx of the caller's own. What is negative,
+ * no finite number or above 1e30 is refused with the index of its patch; the last frame then
+ * stays. */
 rebounce_status rebounce_engine_relight_direct(rebounce_engine* engine, const float* irradiance,
                                                size_t patch_count);
 

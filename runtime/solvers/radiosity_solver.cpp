@@ -7,6 +7,7 @@
 #include "rebounce/error.h"
 #include "transfer/base/area_norm.h"
 #include "transfer/base/argument_check.h"
+#include "transfer/base/finite_values.h"
 
 namespace rebounce {
 namespace {
@@ -88,6 +89,15 @@ void RadiositySolver::check(std::span<const Float3> initial_exitance,
   }
 }
 
+void RadiositySolver::refuse_if_not_finite(const SolveResult& result) {
+  const std::span<const float> channels(reinterpret_cast<const float*>(radiosity_.data()),
+                                        kChannelCount * radiosity_.size());
+  if (std::isfinite(result.residual) && are_finite(channels)) return;
+  reset();
+  throw Error(
+      "solver: the solution is not finite; give less light, or take another method if it diverges");
+}
+
 SolveResult RadiositySolver::solve(std::span<const Float3> initial_exitance,
                                    const SolveSettings& settings) {
   const Clock::time_point start = Clock::now();
@@ -104,6 +114,7 @@ SolveResult RadiositySolver::solve(std::span<const Float3> initial_exitance,
   }
   const SolveResult result = iterate(settings, start);
   initial_exitance_ = {};
+  refuse_if_not_finite(result);
   return result;
 }
 

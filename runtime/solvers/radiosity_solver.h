@@ -31,7 +31,8 @@ class RadiositySolver {
   RadiositySolver& operator=(const RadiositySolver&) = delete;
 
   /// Solves for `initial_exitance` M0 = rho E + Me [n] in lx, starting from the last solution.
-  /// Throws Error if its size or a setting is wrong, or a number of it is negative or not finite.
+  /// Throws Error if its size or a setting is wrong, or a number of it is negative or not finite;
+  /// and, after a reset(), if the solution is not finite.
   SolveResult solve(std::span<const Float3> initial_exitance, const SolveSettings& settings = {});
 
   /// Does the same and copies the solution [n] in lx to `radiosity`.
@@ -98,6 +99,7 @@ class RadiositySolver {
   SolveResult iterate(const SolveSettings& settings, Clock::time_point start);
   bool monitor_ends();
   void check(std::span<const Float3> initial_exitance, const SolveSettings& settings) const;
+  void refuse_if_not_finite(const SolveResult& result);
 
   bool cold_ = true;
   Monitor monitor_;

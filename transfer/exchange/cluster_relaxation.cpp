@@ -93,6 +93,7 @@ class ClusterRelaxation final : public Relaxation {
 
   void begin(const RelaxationProblem& problem, std::span<const Float3> radiosity) override {
     area_ = problem.area;
+    radiosity_.clear();  // where there is no patch, sweeps of light that overflows leave NaN
     for (std::size_t k = 0; k < exchange_.patch.size(); ++k) {
       const std::uint32_t p = exchange_.patch[k];
       const float scale = exchange_.position_scale(k), root = scaled_root(k);

@@ -74,19 +74,20 @@ class Engine {
   /// all that follows. Lights are known by their number: keep their order, so that only those that
   /// moved or changed shape are traced again. Throws Error if a field of a light that its type
   /// uses, or its position, colour, intensity or range, is out of range, with the light's number,
-  /// if a number of the sky is negative or not finite, or if the sky has a distribution and the
-  /// data do not say how much of its cells is seen. The last frame then stays.
+  /// if a number of the sky is negative or not finite, if the sky has a distribution and the data
+  /// do not say how much of its cells is seen, or if more than 1e30 lx arrive at a patch, with its
+  /// index. The last frame then stays.
   void relight(std::span<const Light> lights, const Sky& sky);
 
   /// One frame with a direct irradiance [n] in lx that the caller brings, from shadow maps for
-  /// instance; its sky is dark. Throws Error if the size is wrong or a number is negative or not
-  /// finite, with the index of the patch; the last frame then stays.
+  /// instance; its sky is dark. Throws Error if the size is wrong or a number is negative, not
+  /// finite or above 1e30, with the index of the patch; the last frame then stays.
   void relight(std::span<const Float3> direct_irradiance);
 
   /// From the next frame on, what the surfaces of material `material` emit is that of the scene
-  /// times `scale`, each channel >= 0. Throws Error if there is no such material or `scale` is
-  /// negative or not finite. A patch of several materials follows the one that emits from most of
-  /// it.
+  /// times `scale`, each channel >= 0. Throws Error if there is no such material, `scale` is
+  /// negative or not finite, or a patch would emit more than 1e30 lx. A patch of several materials
+  /// follows the one that emits from most of it.
   void set_emission_scale(std::uint32_t material, const Float3& scale);
 
   // Results, [n] in lx; valid until the next frame.
@@ -173,9 +174,9 @@ struct GpuStageTime {
 /// Engine, which rounds light to integers. Two frames with the same light give the same bits on one
 /// card and driver.
 ///
-/// All calls, destruction too, are made with the same context, or one that shares its objects,
-/// current on the calling thread. They leave the program and all bindings of the context as they
-/// were.
+/// All calls, destruction too, are made with the same context, or one that shares its objects
+/// (measure_stages takes one alone), current on the calling thread. They leave the program and all
+/// bindings of the context as they were.
 class GpuEngine {
  public:
   /// Compiles the shaders and takes the operator and the points of patches to the card; it shares
@@ -207,8 +208,9 @@ class GpuEngine {
   /// receiver_points(). The shadow maps are complete; shaders that write the others and read the
   /// result need no barrier. Texels of the shadow maps are taken four at a time, for points that
   /// are two texels off their surface. Throws Error with the lamp's number if a field is out of
-  /// range, its type has no shadow map, or its texture is not what it says; if a buffer does not
-  /// exist, is too small or is given twice; nothing is done then.
+  /// range, its type has no shadow map, its texture is not what it says or has no storage for
+  /// depths, or a view is in a layer that the texture has not; if a buffer does not exist, is too
+  /// small or is given twice; nothing is done then.
   void light_patches(std::span<const GpuLamp> lamps, unsigned direct_irradiance,
                      unsigned others = 0);
 
@@ -218,7 +220,9 @@ class GpuEngine {
   /// or is given twice, or if the file has not what it needs; nothing is done then.
   void relight(const GpuBuffers& buffers);
 
-  /// From now on, whether the times of stages are measured; at first they are not.
+  /// From now on, whether the times of stages are measured; at first they are not. While they are,
+  /// all calls, measure_stages(false) and destruction too, are made with the context that was
+  /// current when it began, since contexts do not share queries of time.
   void measure_stages(bool measure);
   /// Those of the last light_patches and relight, in their order, by time stamps, without those
   /// that had nothing to do; waits for the card.

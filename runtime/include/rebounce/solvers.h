@@ -87,7 +87,8 @@ class Solver {
 
   /// Solves for `initial_exitance` M0 = rho E + Me [n] in lx, from the last solution. Throws Error
   /// if its size or a setting is wrong, or a number of it is negative or not finite; the last
-  /// solution then stays.
+  /// solution then stays. Throws Error too if the solution is not finite, as where light comes
+  /// close to the largest float or a method diverges; the next solve then starts from nothing.
   SolveResult solve(std::span<const Float3> initial_exitance, const SolveSettings& settings = {});
 
   /// The same, and copies the solution [n] in lx to `radiosity`.

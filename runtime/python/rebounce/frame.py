@@ -128,12 +128,13 @@ class Engine:
 
     def relight(self, lights: Sequence[Light] = (), sky: Optional[Sky] = None) -> None:
         """One frame. Raises ValueError if a field has no such value, Error, with the number of the
-        light, if it is out of range; the last frame then stays."""
+        light, if it is out of range or more than 1e30 lx arrive; the last frame then stays."""
         self._core.relight(list(lights), sky)
 
     def relight_by_direct(self, direct_irradiance: npt.ArrayLike) -> None:
         """One frame with the direct irradiance [n, 3] in lx of the caller. Raises ValueError for
-        another shape, Error if a number is negative or not finite; the last frame then stays."""
+        another shape, Error if a number is negative, not finite or above 1e30; the last frame then
+        stays."""
         self._core.relight_by_direct(np.ascontiguousarray(direct_irradiance, dtype=np.float32))
 
     def set_emission_scale(self, material: Union[int, str], scale: Union[float, Triple]) -> None:

@@ -111,6 +111,48 @@ TEST(Engine, LightThatIsNoneIsRefusedAndTheLastFrameStays) {
   }
 }
 
+TEST(Engine, LightThatSumsCannotTakeIsRefusedAndTheLastFrameStays) {
+  Engine engine(lit_squares());
+  Light lamp = lamp_at(0.1F);
+  engine.relight({&lamp, 1}, {});
+  const std::vector<Float3> good = copy(engine.direct_irradiance()),
+                            radiosity = copy(engine.radiosity());
+  const auto expect_refused = [&](const auto& call, const char* message) {
+    test::expect_error(call, message);
+    EXPECT_EQ(good, copy(engine.direct_irradiance()));
+    EXPECT_EQ(radiosity, copy(engine.radiosity()));
+    EXPECT_EQ(engine.sky().luminance, 0);
+  };
+  Light bright = lamp_at(0.7F);
+  for (const float intensity : {1e33F, 1e38F, std::numeric_limits<float>::max()}) {
+    bright.intensity = intensity;
+    const std::array<Light, 3> lamps = {lamp, bright, lamp};
+    expect_refused([&] { engine.relight(lamps, {}); }, "light 1 is too bright: the direct irrad");
+  }
+  const Sky sky = {{1, 1, 1}, 1e32F};
+  expect_refused([&] { engine.relight({&lamp, 1}, sky); }, "the sky is too bright");
+  std::vector<Float3> direct = good;
+  direct[7][1] = 2e30F;
+  expect_refused([&] { engine.relight(direct); }, "patch 7 is above 1e30 lx");
+}
+
+TEST(Engine, LightUpToTheLimitScales) {
+  const auto data = std::make_shared<TransferData>(*lit_squares());
+  std::ranges::fill(data->patches.emitted_exitance, Float3{0, 0, 0});
+  Engine engine(data);
+  std::vector<Float3> direct(data->patches.size(), Float3{1, 0.5F, 0.25F});
+  engine.relight(direct);
+  const std::vector<Float3> expected = copy(engine.radiosity());
+  constexpr float kScale = 0x1p99F;  // rounding is the same for powers of two
+  for (Float3& e : direct) e = {kScale * e[0], kScale * e[1], kScale * e[2]};
+  engine.relight(direct);
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    for (int c = 0; c < kChannelCount; ++c) {
+      EXPECT_EQ(engine.radiosity()[i][c], kScale * expected[i][c]);
+    }
+  }
+}
+
 TEST(Engine, OutputsOfAnotherSizeAreRefused) {
   Engine engine(lit_squares());
   engine.relight(std::vector<Float3>(engine.radiosity().size(), {1, 1, 1}));
@@ -167,6 +209,7 @@ TEST(Engine, EmittersAreScaledByMaterial) {
   EXPECT_THROW(engine.set_emission_scale(3, {1, 1, 1}), Error);
   EXPECT_THROW(engine.set_emission_scale(1, {1, -1, 1}), Error);
   test::expect_error([&] { engine.set_emission_scale(2, {3e38F, 1, 1}); }, "not finite");
+  test::expect_error([&] { engine.set_emission_scale(2, {1e30F, 1, 1}); }, "above 1e30 lx");
   engine.relight({}, {});
   EXPECT_EQ(full, copy(engine.radiosity())) << "nothing is scaled";
 }

@@ -13,110 +13,14 @@
 
 #include "rebounce.h"
 #include "rebounce/engine.h"
+#include "tests/runtime/frame/from_c.h"
 #include "tests/support/allocation_counter.h"
-#include "tests/support/temporary_folder.h"
-#include "tests/support/test_scene_data.h"
 #include "tests/support/thread_pool.h"
-#include "transfer/file/transfer_file_io.h"
 
 namespace rebounce::test_engine_from_c {
 namespace {
 
-class FromC : public testing::Test {
- protected:
-  void SetUp() override {
-    TransferData data;
-    test::add_square(data, 1, 0, 4, true, {0.5F, 0.4F, 0.3F});
-    test::add_square(data, 1, 2, 4, false, {0.2F, 0.7F, 0.9F});
-    test::add_even_exchange(data);
-    DisplayMesh& mesh = data.mesh;
-    mesh.base_color_texcoord.resize(mesh.position.size());
-    mesh.emissive_texcoord.resize(mesh.position.size());
-    mesh.vertex_color.resize(mesh.position.size());
-    add_weights(mesh);
-    data.materials.resize(2);
-    data.materials[0].name = "plaster";
-    data.materials[1].name = "screen";
-    data.materials[1].emitted_luminance = {1, 2, 3};
-    data.mesh.triangle_material[5] = 1;
-    data.cameras.resize(2);
-    data.cameras[1].name = "door";
-    data.cameras[1].position = {1, 2, 3};
-    data.cameras[1].vertical_fov = 0.5F;
-    data.record.error_mean = 0.25;
-    data.record.error_max = 0.5;
-    data.record.error_bound = 0.75;
-    data.lightmap = one_texel_for_each(mesh);
-    data.surface_harmonics.sky.assign(data.patches.size(), LinearHarmonics{1, 1});
-    data.surface_harmonics.entry_begin.assign(data.patches.size() + 1, 0);
-    add_zenith(data);
-    const std::string path = (folder_ / "room.safetensors").string();
-    save_transfer_file(path, data);
-    ASSERT_EQ(rebounce_transfer_load(path.c_str(), &transfer_), REBOUNCE_OK);
-    ASSERT_EQ(rebounce_engine_create(transfer_, nullptr, &engine_), REBOUNCE_OK);
-    rebounce_light_init(&lamp_);
-    lamp_.position[1] = 1;
-  }
-  void TearDown() override {
-    rebounce_engine_destroy(engine_);
-    rebounce_transfer_release(transfer_);
-  }
-
-  /// Each vertex is that of its patch, but the first, which takes it twice and subtracts the last.
-  static void add_weights(DisplayMesh& mesh) {
-    mesh.weight_begin = {0};
-    const auto patch_count = static_cast<std::uint32_t>(mesh.position.size() / 3);
-    for (std::uint32_t v = 0; v < mesh.position.size(); ++v) {
-      mesh.weight_patch.push_back(v / 3);
-      mesh.weight.push_back(v == 0 ? 2.0F : 1.0F);
-      if (v == 0) {
-        mesh.weight_patch.push_back(patch_count - 1);
-        mesh.weight.push_back(-1.0F);
-      }
-      mesh.weight_begin.push_back(static_cast<std::uint32_t>(mesh.weight.size()));
-    }
-  }
-
-  /// The bytes of the file of the transfer.
-  std::string bytes() const {
-    std::ifstream file(folder_ / "room.safetensors", std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
-
-  rebounce_transfer_info info() const {
-    rebounce_transfer_info info;
-    rebounce_transfer_info_init(&info);
-    EXPECT_EQ(rebounce_transfer_get_info(transfer_, &info), REBOUNCE_OK);
-    return info;
-  }
-
-  /// Every patch sees half of its sky in the zenith.
-  static void add_zenith(TransferData& data) {
-    data.sky_cells.entry_begin = {0};
-    for (std::uint32_t i = 0; i < data.patches.size(); ++i) {
-      data.sky_cells.entry_begin.push_back(i + 1);
-      data.sky_cells.entry_cell.push_back(145);
-      data.sky_cells.entry_part.push_back(0.5F);
-    }
-  }
-
-  /// A lightmap of one row, with the middle of each triangle.
-  static Lightmap one_texel_for_each(const DisplayMesh& mesh) {
-    Lightmap map;
-    map.width = static_cast<std::uint32_t>(mesh.triangle.size());
-    map.height = 1;
-    map.texcoord.assign(mesh.position.size(), Float2{0.5F, 0.5F});
-    map.has_texels.assign(map.width, 1);
-    map.weight.assign(map.width, Float2{1 / 3.0F, 1 / 3.0F});
-    for (std::uint32_t t = 0; t < map.width; ++t) map.triangle.push_back(t);
-    return map;
-  }
-
-  test::TemporaryFolder folder_;
-  rebounce_transfer* transfer_ = nullptr;
-  rebounce_engine* engine_ = nullptr;
-  rebounce_light lamp_{};
-};
+using test::FromC;
 
 TEST_F(FromC, ReadsAFileFromMemory) {
   std::string file = bytes();
@@ -360,98 +264,6 @@ TEST_F(FromC, ALuminaireHasAProfile) {
   EXPECT_NE(std::string(rebounce_last_error()).find("lamp.ies"), std::string::npos);
 }
 
-TEST_F(FromC, ProgramsThatKnowNoLightmapGetTheInfoTheyKnow) {
-  rebounce_transfer_info info{};
-  info.struct_size = offsetof(rebounce_transfer_info, lightmap_width);
-  info.lightmap_width = 77;  // memory that is not the structure's
-  ASSERT_EQ(rebounce_transfer_get_info(transfer_, &info), REBOUNCE_OK);
-  EXPECT_GT(info.patch_count, 0U);
-  EXPECT_EQ(info.lightmap_width, 77U);
-
-  // The address sanitizer sees where this memory ends.
-  std::vector<std::uint32_t> known(info.struct_size / sizeof(std::uint32_t));
-  known[0] = info.struct_size;
-  auto* const as_given = reinterpret_cast<rebounce_transfer_info*>(known.data());
-  ASSERT_EQ(rebounce_transfer_get_info(transfer_, as_given), REBOUNCE_OK);
-  EXPECT_EQ(known[1], info.patch_count);
-}
-
-/// The structures as they were in version 1 of the interface.
-struct LightOfVersion1 {
-  std::uint32_t struct_size, type;
-  std::array<float, 3> position, direction, color;
-  float intensity, range, inner_cone_angle, outer_cone_angle, radius;
-  std::array<float, 2> size;
-  std::array<float, 3> tangent;
-};
-struct SettingsOfVersion1 {
-  std::uint32_t struct_size, points_per_patch, area_light_samples, light_capacity;
-};
-
-TEST_F(FromC, StructuresOfVersion1AreUnderstood) {
-  const SettingsOfVersion1 settings = {sizeof(settings), 8, 4, 16};
-  rebounce_engine* older = nullptr;
-  ASSERT_EQ(rebounce_engine_create(
-                transfer_, reinterpret_cast<const rebounce_engine_settings*>(&settings), &older),
-            REBOUNCE_OK)
-      << rebounce_last_error();
-  std::array<LightOfVersion1, 2> lights{};
-  std::array<rebounce_light, 2> present{};
-  for (std::size_t k = 0; k < 2; ++k) {
-    lamp_.position[0] = 0.3F * static_cast<float>(k);
-    present[k] = lamp_;
-    std::memcpy(&lights[k], &lamp_, sizeof(LightOfVersion1));
-    lights[k].struct_size = sizeof(LightOfVersion1);
-  }
-  const auto* const as_given = reinterpret_cast<const rebounce_light*>(lights.data());
-  ASSERT_EQ(rebounce_engine_relight(older, as_given, 2, nullptr), REBOUNCE_OK)
-      << rebounce_last_error();
-  ASSERT_EQ(rebounce_engine_relight(engine_, present.data(), 2, nullptr), REBOUNCE_OK);
-  rebounce_transfer_info info{};
-  info.struct_size = sizeof(info);
-  ASSERT_EQ(rebounce_transfer_get_info(transfer_, &info), REBOUNCE_OK);
-  const float* const expected = rebounce_engine_radiosity(engine_);
-  EXPECT_GT(expected[0], 0);
-  EXPECT_TRUE(std::equal(expected, expected + 3 * std::size_t{info.patch_count},
-                         rebounce_engine_radiosity(older)));
-  rebounce_engine_destroy(older);
-  lights[0].struct_size -= 4;
-  EXPECT_EQ(rebounce_engine_relight(engine_, as_given, 1, nullptr), REBOUNCE_INVALID_ARGUMENT);
-}
-
-/// Bytes that `init` writes to a structure that its caller knows `size` bytes of; what is beyond
-/// must stay.
-template <typename Struct>
-std::vector<unsigned char> bytes_of_init(void (*init)(Struct*, std::uint32_t), std::size_t size) {
-  constexpr unsigned char kUntouched = 0xAB;
-  alignas(Struct) std::array<unsigned char, sizeof(Struct) + 64> memory;
-  memory.fill(kUntouched);
-  init(reinterpret_cast<Struct*>(memory.data()), static_cast<std::uint32_t>(size));
-  const auto end = memory.begin() + static_cast<std::ptrdiff_t>(size);
-  EXPECT_TRUE(
-      std::all_of(end, memory.end(), [](unsigned char byte) { return byte == kUntouched; }));
-  return {memory.begin(), end};
-}
-
-TEST_F(FromC, InitWritesWhatTheCallersVersionOfAStructureHas) {
-  const auto whole = bytes_of_init(rebounce_light_init_sized, sizeof(rebounce_light));
-  auto older = bytes_of_init(rebounce_light_init_sized, sizeof(LightOfVersion1));
-  EXPECT_EQ(older[0], sizeof(LightOfVersion1));
-  EXPECT_TRUE(std::equal(older.begin() + 4, older.end(), whole.begin() + 4));
-  bytes_of_init(rebounce_engine_settings_init_sized, sizeof(SettingsOfVersion1));
-  bytes_of_init(rebounce_transfer_info_init_sized,
-                offsetof(rebounce_transfer_info, lightmap_width));
-  bytes_of_init(rebounce_camera_init_sized, sizeof(rebounce_camera));
-
-  const auto later = bytes_of_init(rebounce_light_init_sized, sizeof(rebounce_light) + 8);
-  EXPECT_EQ(later[0], sizeof(rebounce_light) + 8);
-  EXPECT_TRUE(
-      std::all_of(later.end() - 8, later.end(), [](unsigned char byte) { return byte == 0; }));
-
-  EXPECT_EQ(bytes_of_init(rebounce_light_init_sized, 3), std::vector<unsigned char>(3, 0xAB));
-  rebounce_light_init_sized(nullptr, sizeof(rebounce_light));
-}
-
 TEST_F(FromC, AFrameRunsOnTheThreadsOfTheCaller) {
   test::ThreadPool pool(3);
   rebounce_engine_settings settings;
@@ -477,29 +289,6 @@ TEST_F(FromC, AFrameRunsOnTheThreadsOfTheCaller) {
     loops = pool.loop_count();
     rebounce_engine_destroy(engine);
   }
-}
-
-TEST_F(FromC, StructuresOfALaterVersionAreUnderstood) {
-  struct LaterLight {
-    rebounce_light light;
-    float something_new[5];
-  };
-  std::array<LaterLight, 2> later{};
-  std::array<rebounce_light, 2> now{};
-  for (std::size_t k = 0; k < 2; ++k) {
-    now[k] = lamp_;
-    now[k].position[0] = 0.3F * static_cast<float>(k);
-    later[k].light = now[k];
-    later[k].light.struct_size = sizeof(LaterLight);
-  }
-  ASSERT_EQ(rebounce_engine_relight(engine_, now.data(), 2, nullptr), REBOUNCE_OK);
-  rebounce_transfer_info info{};
-  info.struct_size = sizeof(info);
-  ASSERT_EQ(rebounce_transfer_get_info(transfer_, &info), REBOUNCE_OK);
-  const float* const direct = rebounce_engine_direct_irradiance(engine_);
-  const std::vector<float> before(direct, direct + 3 * std::size_t{info.patch_count});
-  ASSERT_EQ(rebounce_engine_relight(engine_, &later[0].light, 2, nullptr), REBOUNCE_OK);
-  EXPECT_TRUE(std::equal(before.begin(), before.end(), direct));
 }
 
 TEST_F(FromC, AnErrorIsALineAndBelongsToItsThread) {

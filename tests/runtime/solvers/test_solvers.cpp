@@ -410,6 +410,25 @@ TEST_P(EveryMethod, RefusesWhatDoesNotFit) {
   EXPECT_THROW(c.solver(method()), Error);
 }
 
+TEST_P(EveryMethod, DoesNotStartFromASolutionThatIsNotFinite) {
+  const Case c = make_case(0.9F);
+  const auto solver = c.solver(method()), fresh = c.solver(method());
+  solver->solve(c.system.initial_exitance);
+  const std::vector<Float3> bright(kPatchCount, Float3{3e38F, 3e38F, 3e38F});
+  for (const bool measure : {true, false}) {
+    const auto attempt = [&] { return solver->solve(bright, {.measure_residual = measure}); };
+    if (method() == SolveMethod::kRefine) {  // undoes such a sweep
+      EXPECT_TRUE(attempt().diverged);
+      solver->reset();
+    } else {
+      test::expect_error(attempt, "the solution is not finite");
+    }
+  }
+  EXPECT_TRUE(solver->solve(c.system.initial_exitance).converged);
+  fresh->solve(c.system.initial_exitance);
+  EXPECT_EQ(copy(solver->radiosity()), copy(fresh->radiosity()));
+}
+
 TEST(Refinement, AHandfulOfStepsFromThreePerCent) {
   const Case c(0.8F);  // its operator is 3 % too large
   const auto solver = c.solver(SolveMethod::kRefine);
