@@ -17,18 +17,14 @@ namespace {
 // In lx. What patches send on adds up in single precision, and up to here no sum overflows.
 constexpr float kMostLight = 1e30F;
 
-bool is_too_much(const Float3& light) {
-  return !std::ranges::all_of(light, [](float x) { return x <= kMostLight; });
+bool can_be_taken(const Float3& light) {
+  return is_light(light, kMostLight);
 }
 
-/// The first patch that gets more than a frame can take, or what is no number.
+/// The first patch that gets more than a frame can take, or what is no light.
 std::optional<std::size_t> overexposed_patch(std::span<const Float3> irradiance) {
-  unsigned bad = 0;  // without a branch for each
-  for (const Float3& e : irradiance) {
-    for (const float x : e) bad |= x <= kMostLight ? 0U : 1U;
-  }
-  if (bad == 0) return std::nullopt;
-  return std::ranges::find_if(irradiance, is_too_much) - irradiance.begin();
+  if (are_light(irradiance, kMostLight)) return std::nullopt;
+  return std::ranges::find_if_not(irradiance, can_be_taken) - irradiance.begin();
 }
 
 std::string too_much_light(std::size_t patch) {
@@ -112,7 +108,7 @@ Engine& Engine::operator=(Engine&& other) noexcept = default;
 void Engine::Parts::compute_direct(std::span<const Light> lights, const Sky& frame_sky) {
   direct_lighting->compute(lights, frame_sky, arriving, scheduler);
   if (const auto patch = overexposed_patch(arriving)) {
-    const bool by_sky = is_too_much(sky_irradiance(*data, frame_sky, *patch));
+    const bool by_sky = !can_be_taken(sky_irradiance(*data, frame_sky, *patch));
     const std::string source =
         by_sky ? "the sky" : "light " + std::to_string(direct_lighting->strongest_light(*patch));
     throw Error(source + " is too bright: " + too_much_light(*patch));
@@ -133,8 +129,10 @@ void Engine::relight(std::span<const Light> lights, const Sky& sky) {
 void Engine::relight(std::span<const Float3> direct_irradiance) {
   const OneThread guard(parts_->use);
   check_size("the direct irradiance", direct_irradiance.size(), parts_->direct_irradiance.size());
-  check_light_of_patches("the direct irradiance", direct_irradiance);
-  if (const auto patch = overexposed_patch(direct_irradiance)) throw Error(too_much_light(*patch));
+  if (const auto patch = overexposed_patch(direct_irradiance)) {
+    check_light_of_patches("the direct irradiance", direct_irradiance);
+    throw Error(too_much_light(*patch));
+  }
   std::ranges::copy(direct_irradiance, parts_->direct_irradiance.begin());
   parts_->sky = {};
   parts_->compute_initial_exitance();
@@ -161,7 +159,7 @@ void Engine::set_emission_scale(std::uint32_t material, const Float3& scale) {
     }
   };
   for_each([&](std::size_t i) {
-    if (!is_light(scaled(i)) || is_too_much(scaled(i))) {
+    if (!can_be_taken(scaled(i))) {
       throw Error("a scale of emission makes light that is not finite or above 1e30 lx");
     }
   });

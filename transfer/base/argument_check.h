@@ -1,7 +1,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <span>
@@ -27,17 +26,18 @@ inline void check_workspace(const char* what, std::size_t size, std::size_t want
               std::to_string(wanted));
 }
 
-/// True unless a channel is negative or not finite.
-inline bool is_light(const Float3& light) {
-  return std::ranges::all_of(light, [](float x) { return std::isfinite(x) && x >= 0; });
+/// True unless a channel is negative, above `most` or no number.
+inline bool is_light(const Float3& light, float most = std::numeric_limits<float>::max()) {
+  return std::ranges::all_of(light, [most](float x) { return x >= 0 && x <= most; });
 }
 
 /// Whether is_light is true of all; without a branch for each.
-inline bool are_light(std::span<const Float3> lights) {
+inline bool are_light(std::span<const Float3> lights,
+                      float most = std::numeric_limits<float>::max()) {
   const auto* channel = reinterpret_cast<const float*>(lights.data());
   unsigned bad = 0;
   for (std::size_t k = 0; k < lights.size() * kChannelCount; ++k) {
-    bad |= (channel[k] >= 0) & (channel[k] <= std::numeric_limits<float>::max()) ? 0U : 1U;
+    bad |= (channel[k] >= 0) & (channel[k] <= most) ? 0U : 1U;
   }
   return bad == 0;
 }
@@ -45,7 +45,7 @@ inline bool are_light(std::span<const Float3> lights) {
 /// Throws Error that names the first patch whose entry of `light` [n] is_light is false of.
 inline void check_light_of_patches(const char* what, std::span<const Float3> light) {
   if (are_light(light)) return;
-  const auto bad = std::ranges::find_if_not(light, is_light);
+  const auto bad = std::ranges::find_if_not(light, [](const Float3& e) { return is_light(e); });
   throw Error(std::string(what) + " of patch " + std::to_string(bad - light.begin()) +
               " is negative or not finite; it must be in lx, at least 0");
 }
