@@ -119,7 +119,7 @@ class ContenderBuilder {
                   const DrawnLights& radiosities) {
     const std::string name = shared_name(tolerance);
     const auto work = [&](const Progress& progress) {
-      return compress_to_tolerance(matrix, result_.data->patches, radiosities.view(),
+      return compress_to_tolerance(matrix, result_.data->patches, radiosities,
                                    {tolerance, kPrecision}, progress);
     };
     result_.forms.push_back(

@@ -29,16 +29,16 @@ constexpr double kErrorPower = 0.7, kCountPower = 0.5;
 // error down, it is not what binds, and links are not made again.
 constexpr double kLeastStep = 0.3, kMostStep = 0.7, kLeastGain = 0.85;
 
-/// Patches and mesh of a model, and their links, as long as the object lives in the data of a
-/// build.
+/// Patches and mesh of a model, as long as the object lives in the data of a build, with the light
+/// that escapes them.
 class LentPatches {
  public:
-  LentPatches(PatchModel& model, LinkBuild& build, TransferData& data)
-      : model_(model), build_(build), data_(data) {
+  LentPatches(PatchModel& model, const EscapedLight& escaped, TransferData& data)
+      : model_(model), data_(data) {
     exchange();
-    data.patches.sky_visibility = build.sky_visibility;
-    data.patches.absorbed = build.absorbed;
-    data.sky_cells = build.sky_cells;
+    data.patches.sky_visibility = escaped.sky_visibility;
+    data.patches.absorbed = escaped.absorbed;
+    data.sky_cells = escaped.sky_cells;
   }
   ~LentPatches() { exchange(); }
   LentPatches(const LentPatches&) = delete;
@@ -48,11 +48,9 @@ class LentPatches {
   void exchange() {
     std::swap(model_.patches, data_.patches);
     std::swap(model_.mesh, data_.mesh);
-    std::swap(build_.links, data_.links);
   }
 
   PatchModel& model_;
-  LinkBuild& build_;
   TransferData& data_;
 };
 
@@ -62,14 +60,14 @@ double finer_epsilon(double epsilon, double error, double tolerance) {
   return epsilon * std::clamp(wanted, kLeastStep, kMostStep);
 }
 
-/// The memory that as many links as epsilon times `step` gives need, where `builder` has made
-/// `link_count` and nothing else holds them.
+/// The memory that as many links as epsilon times `step` gives need, where `builder` has found
+/// `link_count`.
 std::uint64_t bytes_of_finer(const PatchModel& model, const PatchRoles& roles,
                              const BuildSettings& decided, const LinkBuilder& builder,
                              std::size_t link_count, double step) {
   const double finer = static_cast<double>(link_count) * std::pow(step, -kCountPower);
   LinkedBuild build =
-      linked_build(built_scene(model.patches.size(), model.mesh), link_count,
+      linked_build(built_scene(model.patches.size(), model.mesh), /*link_count=*/0,
                    model.patches.reflectance, roles, kCompressionPart * decided.tolerance);
   build.link_count = static_cast<std::size_t>(finer);
   build.held_bytes -= std::min(build.held_bytes, builder.held_bytes());
@@ -95,23 +93,25 @@ JudgedLinks near_enough_links(PatchModel& model, const RayTracer& tracer, const 
   LinkBuilder builder(model, tracer, decided.form_factors);
   double last_error = 0;
   for (int round = 1;; ++round) {
-    LinkBuild build = clock.run(round == 1 ? "form factors" : "finer links",
-                                [&](const Progress& part) { return builder.build(epsilon, part); });
-    if (!judged || round == kMostRounds) return {std::move(build), epsilon, limits};
+    const std::size_t link_count =
+        clock.run(round == 1 ? "form factors" : "finer links",
+                  [&](const Progress& part) { return builder.find(epsilon, part); });
+    if (!judged || round == kMostRounds) return {builder.result(), epsilon, limits};
     const double error = clock.run("check of links", [&](const Progress& part) {
-      const LentPatches lent(model, build, data);
-      return error_of_links(data, model.shown_patch, tracer, roles, decided.form_factors.seed, part)
+      const auto links = builder.form_factors();
+      const LentPatches lent(model, builder.escaped(), data);
+      return error_of_links(links, data, model.shown_patch, tracer, roles,
+                            decided.form_factors.seed, part)
           .mean;
     });
     const bool helps = round == 1 || error < kLeastGain * last_error;
     const bool is_last = error <= kAccepted * decided.tolerance || !helps;
     const double finer = finer_epsilon(epsilon, error, decided.tolerance);
     const auto bytes_needed = [&] {
-      return bytes_of_finer(model, roles, decided, builder, build.links.pair.size(),
-                            finer / epsilon);
+      return bytes_of_finer(model, roles, decided, builder, link_count, finer / epsilon);
     };
     if (is_last || !finer_fit(bytes_needed(), decided.memory_limit_bytes, limits)) {
-      return {std::move(build), epsilon, limits};
+      return {builder.result(), epsilon, limits};
     }
     epsilon = finer;
     last_error = error;

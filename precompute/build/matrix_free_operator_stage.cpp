@@ -112,16 +112,16 @@ class LinkedOperator {
         roles_(roles),
         data_(data),
         report_(report),
-        clock_(clock),
-        links_(std::make_shared<const LinkedFormFactors>(data.links, data.patches.area,
-                                                         data.patches.centroid)) {}
+        clock_(clock) {}
 
   std::vector<KindError> make(std::span<const std::uint32_t> shown_patch) {
     FormFactorLinks fewer = clock_.run("fewer links", [&](const Progress& part) {
       return fit_links(data_.links, data_.patches, kErrorPerLink, part);
     });
     find_fitting_lights(fewer);
+    if (!decided_.store_links) fewer = {};
     compress_form_factors_of();
+    data_.links = std::move(fewer);  // the others are in `links_`
     make_operator();
     check(decided_.form_factors.seed);
     const double finer = finer_tolerance(data_.record);
@@ -132,8 +132,6 @@ class LinkedOperator {
     });
     solver_.reset();
     solved_.reset();
-    // The check is the last step that needs all of them.
-    data_.links = decided_.store_links ? std::move(fewer) : FormFactorLinks{};
     if (decided_.store_links) report_.link_count = data_.links.pair.size();
     return std::move(errors_);
   }
@@ -154,17 +152,24 @@ class LinkedOperator {
   }
 
   void compress_form_factors_of() {
+    link_count_ = data_.links.pair.size();
+    links_ = std::make_shared<const LinkedFormFactors>(data_.links, data_.patches.area,
+                                                       data_.patches.centroid);
     data_.compressed_form_factors =
         clock_.run("form factor compression", [&](const Progress& part) {
           return compress_form_factors(data_.links, links_, data_.patches,
                                        lights_.radiosities.view(),
                                        {report_.form_factor_tolerance, Precision::kF16}, part);
         });
+    report_.form_factor_error = form_factor_error(*data_.compressed_form_factors, *links_,
+                                                  data_.patches, lights_.test_radiosities);
+    lights_.radiosities = {};
+    lights_.test_radiosities = {};
   }
 
   void make_operator() {
     const LinkedBuild build{.scene = built_scene(data_.patches.size(), data_.mesh),
-                            .link_count = data_.links.pair.size(),
+                            .link_count = link_count_,
                             .matrix_count = distinct_channels(data_.patches.reflectance),
                             .roles = roles_,
                             .tolerance = tolerance()};
@@ -175,14 +180,12 @@ class LinkedOperator {
         memory_of_matrix_free_transfer(build, decided_.memory_limit_bytes);
     settings.checkpoint = decided_.checkpoint;
     data_.transfer = clock_.run("operator", [&](const Progress& part) {
-      const FittingLights lights = lights_.exitances.view();
-      solved_.emplace(*data_.compressed_form_factors, data_.patches, lights, settings, part);
-      return solved_->compress(lights, tolerance(), part_of(part, solved_->solving_part(), 1));
+      solved_.emplace(*data_.compressed_form_factors, data_.patches, lights_.exitances.view(),
+                      settings, part);
+      return solved_->compress(std::exchange(lights_.exitances, {}), tolerance(),
+                               part_of(part, solved_->solving_part(), 1));
     });
     report_.solve_count = solved_->solve_count();
-    report_.form_factor_error = form_factor_error(*data_.compressed_form_factors, *links_,
-                                                  data_.patches, lights_.test_radiosities);
-    lights_ = {};  // what follows takes their memory
   }
 
   /// Measures the error of the operator under lights of this `seed`.
@@ -210,9 +213,9 @@ class LinkedOperator {
     whole_.reset();
     solver_.reset();
     data_.transfer = clock_.run("operator again", [&](const Progress& part) {
-      const DrawnLights lights =
-          draw_fitting_lights(data_, tracer_, decided_.form_factors.seed, roles_);
-      return solved_->compress(lights.view(), kCompressionPart * finer, part);
+      return solved_->compress(
+          draw_fitting_lights(data_, tracer_, decided_.form_factors.seed, roles_),
+          kCompressionPart * finer, part);
     });
     check(seed_of_second_check(decided_.form_factors.seed));
   }
@@ -223,7 +226,8 @@ class LinkedOperator {
   TransferData& data_;
   BuildReport& report_;
   PhaseClock& clock_;
-  std::shared_ptr<const LinkedFormFactors> links_;  ///< from the first light to the last check
+  std::size_t link_count_ = 0;
+  std::shared_ptr<const LinkedFormFactors> links_;  ///< from their compression to the last check
   FittedLights lights_;
   std::optional<MatrixFreeTransfer> solved_;
   std::optional<CorrectedSolver> solver_;  ///< that the last check has used

@@ -23,8 +23,8 @@ HierarchicalSettings without_cluster_bases(HierarchicalSettings settings) {
 std::shared_ptr<const HierarchicalOperator> compress_form_factors(
     const ExchangeMatrix& exchange, const PatchTable& patches, const FittingLights& radiosities,
     const HierarchicalSettings& settings, const Progress& progress) {
-  return compress_to_tolerance(FormFactorMatrix(exchange, patches.area), patches, radiosities,
-                               without_cluster_bases(settings), progress);
+  return compress_to_tolerance(FormFactorMatrix(exchange, patches.area), patches,
+                               copies_of(radiosities), without_cluster_bases(settings), progress);
 }
 
 std::shared_ptr<const HierarchicalOperator> compress_form_factors(
@@ -40,7 +40,7 @@ std::shared_ptr<const HierarchicalOperator> compress_form_factors(
     const PatchTable& patches, const FittingLights& radiosities,
     const HierarchicalSettings& settings, const Progress& progress) {
   return compress_to_tolerance(LinkedMatrix(links, std::move(product), patches), patches,
-                               radiosities, without_cluster_bases(settings), progress);
+                               copies_of(radiosities), without_cluster_bases(settings), progress);
 }
 
 FormFactorError form_factor_error(const HierarchicalOperator& compressed,

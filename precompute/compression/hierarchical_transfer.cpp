@@ -16,7 +16,8 @@ HierarchicalStorage compress_transfer(const DenseOperator& dense, const PatchTab
 std::shared_ptr<const HierarchicalOperator> build_hierarchical_transfer(
     const DenseOperator& dense, const PatchTable& patches, const FittingLights& lights,
     const HierarchicalSettings& settings, const Progress& progress, const PatchRoles& roles) {
-  return compress_to_tolerance(DenseMatrix(dense, roles), patches, lights, settings, progress);
+  return compress_to_tolerance(DenseMatrix(dense, roles), patches, copies_of(lights), settings,
+                               progress);
 }
 
 }  // namespace rebounce

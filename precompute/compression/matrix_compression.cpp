@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "precompute/compression/nested_bases.h"
 #include "precompute/compression/wanted_blocks.h"
@@ -32,13 +33,12 @@ constexpr double kUniformShare = 0.1;
 constexpr double kConcentrated = 16;
 constexpr int kFinest = 8;
 
-using Exitances = std::span<const std::vector<Float3>>;
+using Lights = std::vector<std::vector<Float3>>;
 
 /// `lights`, after one under which every patch, black ones too, gives off the same.
-std::vector<std::vector<Float3>> with_uniform(std::size_t patch_count, Exitances lights) {
-  std::vector<std::vector<Float3>> all(1, std::vector<Float3>(patch_count, Float3{1, 1, 1}));
-  all.insert(all.end(), lights.begin(), lights.end());
-  return all;
+Lights with_uniform(std::size_t patch_count, Lights lights) {
+  lights.emplace(lights.begin(), patch_count, Float3{1, 1, 1});
+  return lights;
 }
 
 double mean(const std::vector<double>& errors) {
@@ -89,18 +89,18 @@ void CompressionFrame::scale(std::span<const std::int8_t> exponent) {
 }
 
 CompressionFrame compression_frame(const SymmetricMatrix& matrix, const PatchTable& patches,
-                                   Exitances training) {
-  return frame_of(matrix, patches,
-                  ReferenceLighting(matrix, with_uniform(patches.size(), training)));
+                                   std::span<const std::vector<Float3>> training) {
+  Lights lights = with_uniform(patches.size(), {training.begin(), training.end()});
+  return frame_of(matrix, patches, ReferenceLighting(matrix, std::move(lights)));
 }
 
 MatrixCompression::MatrixCompression(const SymmetricMatrix& matrix, const PatchTable& patches,
-                                     Exitances training, const PartSizes& sizes,
+                                     Lights training, const PartSizes& sizes,
                                      const CompressionOptions& options)
     : matrix_(matrix),
       sizes_(sizes),
       nested_(options.nested),
-      truth_(matrix, with_uniform(patches.size(), training)),
+      truth_(matrix, with_uniform(patches.size(), std::move(training))),
       frame_(frame_of(matrix, patches, truth_)) {
   if (!options.equilibrated) return;
   exponent_ = frame_.balance();
@@ -182,9 +182,9 @@ void MatrixCompression::round_finer_where_lit() {
 }
 
 HierarchicalStorage compress_matrix(const SymmetricMatrix& matrix, const PatchTable& patches,
-                                    Exitances training, double multiplier,
-                                    const Progress& progress) {
-  return MatrixCompression(matrix, patches, training)
+                                    std::span<const std::vector<Float3>> training,
+                                    double multiplier, const Progress& progress) {
+  return MatrixCompression(matrix, patches, {training.begin(), training.end()})
       .at(multiplier, {BlockCheckpoint(), {}}, progress);
 }
 

@@ -62,7 +62,7 @@ class MatrixCompression {
  public:
   /// `matrix` must outlive the object; `training` are its training lights.
   MatrixCompression(const SymmetricMatrix& matrix, const PatchTable& patches,
-                    std::span<const std::vector<Float3>> training, const PartSizes& sizes = {},
+                    std::vector<std::vector<Float3>> training, const PartSizes& sizes = {},
                     const CompressionOptions& options = {});
 
   /// The operator (f32) at a multiplier > 0, as found in `kept` or kept there. Throws Cancelled if

@@ -132,7 +132,7 @@ double MatrixFreeTransfer::solving_part() const {
 }
 
 std::shared_ptr<const HierarchicalOperator> MatrixFreeTransfer::compress(
-    const FittingLights& lights, double tolerance, const Progress& progress) const {
+    DrawnLights lights, double tolerance, const Progress& progress) const {
   const State& state = *state_;
   HierarchicalSettings settings = state.settings.compression;
   settings.tolerance = tolerance;
@@ -140,8 +140,10 @@ std::shared_ptr<const HierarchicalOperator> MatrixFreeTransfer::compress(
   // Parts of a second search have the names of those of the first.
   std::filesystem::path folder = state.settings.checkpoint;
   if (!folder.empty() && tolerance != state.settings.compression.tolerance) folder /= "again";
-  const BlockCheckpoint rounds(folder, identity_of_rounds(state.couplings_key, lights, settings));
-  return compress_to_tolerance(state.matrix, state.patches, lights, settings, progress, rounds);
+  const BlockCheckpoint rounds(folder,
+                               identity_of_rounds(state.couplings_key, lights.view(), settings));
+  return compress_to_tolerance(state.matrix, state.patches, std::move(lights), settings, progress,
+                               rounds);
 }
 
 std::shared_ptr<const HierarchicalOperator> build_matrix_free_transfer(
@@ -149,7 +151,7 @@ std::shared_ptr<const HierarchicalOperator> build_matrix_free_transfer(
     const FittingLights& lights, const MatrixFreeTransferSettings& settings,
     const Progress& progress) {
   const MatrixFreeTransfer transfer(form_factors, patches, lights, settings, progress);
-  return transfer.compress(lights, settings.compression.tolerance,
+  return transfer.compress(copies_of(lights), settings.compression.tolerance,
                            part_of(progress, transfer.solving_part(), 1));
 }
 

@@ -36,8 +36,7 @@ class MatrixFreeTransfer {
   /// The operator of a `tolerance` that is that of the settings or, at the least, half of it. Below
   /// that of the settings the error may be a fifth larger than the tolerance, because the columns
   /// stay as exact as the settings ask. Throws likewise.
-  std::shared_ptr<const HierarchicalOperator> compress(const FittingLights& lights,
-                                                       double tolerance,
+  std::shared_ptr<const HierarchicalOperator> compress(DrawnLights lights, double tolerance,
                                                        const Progress& progress = {}) const;
 
   /// Products with the inverse of `form_factors`, as exact as the bases need.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "precompute/compression/matrix_compression.h"
@@ -44,13 +45,13 @@ constexpr double kVectorSize = 9, kBlockSize = 96, kSizedPatches = 16384;
 // The most validation lights that become training lights too.
 constexpr std::size_t kMostJoined = 64;
 
+using Lights = std::vector<std::vector<Float3>>;
+
 /// The truth of a uniform light stands in for validation lights from which nothing arrives.
-ReferenceLighting validation_truth(const SymmetricMatrix& matrix,
-                                   std::span<const std::vector<Float3>> lights) {
-  ReferenceLighting truth(matrix, lights);
+ReferenceLighting validation_truth(const SymmetricMatrix& matrix, Lights lights) {
+  ReferenceLighting truth(matrix, std::move(lights));
   if (truth.light_count() > 0) return truth;
-  const std::vector<Float3> uniform(matrix.area().size(), Float3{1, 1, 1});
-  return ReferenceLighting(matrix, std::span(&uniform, 1));
+  return ReferenceLighting(matrix, Lights(1, {matrix.area().size(), Float3{1, 1, 1}}));
 }
 
 /// The progress of a search after a number of rounds: the usual rounds take equal shares, and each
@@ -151,12 +152,12 @@ double initial_multiplier(double tolerance, std::size_t patch_count) {
 }
 
 std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
-    const SymmetricMatrix& matrix, const PatchTable& patches, const FittingLights& lights,
+    const SymmetricMatrix& matrix, const PatchTable& patches, DrawnLights lights,
     const HierarchicalSettings& settings, const Progress& progress,
     const BlockCheckpoint& checkpoint) {
-  const ReferenceLighting validation = validation_truth(matrix, lights.validation);
+  const ReferenceLighting validation = validation_truth(matrix, std::move(lights.validation));
   report_progress(progress, 0);
-  MatrixCompression compression(matrix, patches, lights.training,
+  MatrixCompression compression(matrix, patches, std::move(lights.training),
                                 part_sizes(settings, patches.size()), options_of(settings));
   report_progress(progress, 0);
   const double tolerance = settings.tolerance;

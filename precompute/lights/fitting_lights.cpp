@@ -41,6 +41,11 @@ std::vector<Float3> own_exitance(const TransferData& data, const RayTracer& trac
 
 }  // namespace
 
+DrawnLights copies_of(const FittingLights& lights) {
+  return {{lights.training.begin(), lights.training.end()},
+          {lights.validation.begin(), lights.validation.end()}};
+}
+
 std::vector<std::vector<Float3>> draw_training_lights(const TransferData& data,
                                                       const RayTracer& tracer, std::uint64_t seed,
                                                       const PatchRoles& roles) {

@@ -28,13 +28,15 @@ struct DrawnLights {
   FittingLights view() const { return {training, validation}; }
 };
 
+DrawnLights copies_of(const FittingLights& lights);
+
 /// The largest numbers of lights: those of an open scene with lamps of its own.
 inline constexpr std::size_t kMostTrainingLights = 193, kMostValidationLights = 513;
 
-/// Bytes per patch of the lights while an operator is fitted to them: the light, a copy and its
-/// result; for training lights also their directions on clusters.
+/// Bytes per patch of the lights while an operator is fitted to them: the light and its result; for
+/// training lights also their directions on clusters.
 inline constexpr std::size_t kFittingLightBytes =
-    3 * sizeof(Float3) * (kMostTrainingLights + kMostValidationLights) +
+    2 * sizeof(Float3) * (kMostTrainingLights + kMostValidationLights) +
     sizeof(double) * kMostTrainingLights;
 
 /// Draws the training lights of a scene: point lights, spot lights, in an open scene suns, and last

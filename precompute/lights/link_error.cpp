@@ -18,10 +18,11 @@ constexpr double kJudgingRays = 0.25, kJudgingResidual = 1e-4, kLeastResidual = 
 
 }  // namespace
 
-SampledError error_of_links(const TransferData& data, std::span<const std::uint32_t> shown_patch,
+SampledError error_of_links(const std::shared_ptr<const LinkedFormFactors>& links,
+                            const TransferData& data, std::span<const std::uint32_t> shown_patch,
                             const RayTracer& tracer, const PatchRoles& roles, std::uint64_t seed,
                             const Progress& progress) {
-  const ReferenceSolver solver(data.links, data.patches);
+  const ReferenceSolver solver(links, data.patches);
   // Other rays than those of the statement that is made of the operator, which chance would favour.
   WholeErrorEstimator estimator(data, roles, mix_bits(seed),
                                 WholeErrorEstimator::sample_for(data.patches.size(), kJudgingRays));

@@ -1,19 +1,22 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "precompute/base/progress.h"
 #include "rebounce/build_report.h"
 #include "runtime/rays/ray_tracer.h"
+#include "transfer/exchange/linked_form_factors.h"
 #include "transfer/file/transfer_data.h"
 
 namespace rebounce {
 
-/// What the light of data.links is off by under a few point lights, for a decision: an eighth of
+/// What the light of `links` is off by under a few point lights, for a decision: an eighth of
 /// the lights and a quarter of the rays of the check. Memory and arguments are those of
 /// WholeErrorEstimator. Throws Cancelled if asked to stop.
-SampledError error_of_links(const TransferData& data, std::span<const std::uint32_t> shown_patch,
+SampledError error_of_links(const std::shared_ptr<const LinkedFormFactors>& links,
+                            const TransferData& data, std::span<const std::uint32_t> shown_patch,
                             const RayTracer& tracer, const PatchRoles& roles, std::uint64_t seed,
                             const Progress& progress = {});
 

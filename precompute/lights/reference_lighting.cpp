@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "precompute/lights/random_lights.h"
 #include "transfer/base/area_norm.h"
@@ -49,12 +50,12 @@ std::vector<std::vector<Float3>> products(const SymmetricMatrix& matrix, Lights 
 }
 
 ReferenceLighting::ReferenceLighting(const SymmetricMatrix& matrix,
-                                     std::span<const std::vector<Float3>> lights)
-    : area_(matrix.area().begin(), matrix.area().end()) {
-  for (const std::vector<Float3>& light : lights) {
-    matrix.roles().keep(PatchRoles::kSource, lights_.emplace_back(light));
-    if (!(area_norm(lights_.back(), area_) > 0)) lights_.pop_back();
-  }
+                                     std::vector<std::vector<Float3>> lights)
+    : area_(matrix.area().begin(), matrix.area().end()), lights_(std::move(lights)) {
+  std::erase_if(lights_, [&](std::vector<Float3>& light) {
+    matrix.roles().keep(PatchRoles::kSource, light);
+    return !(area_norm(light, area_) > 0);
+  });
   truths_ = products(matrix, lights_);
   leave_out_dark();
   keep_received(matrix.roles());

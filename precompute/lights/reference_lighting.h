@@ -21,7 +21,7 @@ class ReferenceLighting {
  public:
   /// `lights` are the vectors that the matrix multiplies, such as initial exitances [n] in lx.
   /// Lights from which nothing arrives anywhere are left out.
-  ReferenceLighting(const SymmetricMatrix& matrix, std::span<const std::vector<Float3>> lights);
+  ReferenceLighting(const SymmetricMatrix& matrix, std::vector<std::vector<Float3>> lights);
 
   std::size_t light_count() const { return lights_.size(); }
 

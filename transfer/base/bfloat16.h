@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstdint>
 
@@ -17,8 +18,15 @@ inline std::uint16_t float_to_bfloat16(float value) {
   return static_cast<std::uint16_t>((bits + 0x7FFFU + ((bits >> 16) & 1U)) >> 16);
 }
 
-inline float round_to_bfloat16(float value) {
-  return bfloat16_to_float(float_to_bfloat16(value));
+/// The bits of three numbers, such as a gradient.
+using BFloat16x3 = std::array<std::uint16_t, 3>;
+
+inline BFloat16x3 to_bfloat16(float x, float y, float z) {
+  return {float_to_bfloat16(x), float_to_bfloat16(y), float_to_bfloat16(z)};
+}
+
+inline std::array<float, 3> to_floats(const BFloat16x3& bits) {
+  return {bfloat16_to_float(bits[0]), bfloat16_to_float(bits[1]), bfloat16_to_float(bits[2])};
 }
 
 }  // namespace rebounce

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <numeric>
 #include <string>
 #include <type_traits>
 
 #include "rebounce/error.h"
 #include "transfer/base/argument_check.h"
-#include "transfer/exchange/links_by_node.h"
 #include "transfer/kernels/kernels.h"
 #include "transfer/kernels/link_gather.h"
 
@@ -34,22 +34,31 @@ GatherAlongLinks<Columns> fastest_gather() {
   }
 }
 
-std::array<std::uint16_t, 3> bfloat16s(const float* values) {
-  return {float_to_bfloat16(values[0]), float_to_bfloat16(values[1]), float_to_bfloat16(values[2])};
+/// The links in the arrays of `links`, which must outlive what is returned.
+GiveLinks each_of(const FormFactorLinks& links) {
+  return [&links](const std::function<void(const NodeLink&)>& take) {
+    for (std::size_t k = 0; k < links.pair.size(); ++k) {
+      const auto& g = links.gradient[k];
+      take({links.pair[k][0], links.pair[k][1], links.exchange_area[k],
+            to_bfloat16(g[0], g[1], g[2]), to_bfloat16(g[3], g[4], g[5])});
+    }
+  };
 }
 
-IncomingLink seen_from(std::uint32_t node, const FormFactorLinks& links, std::uint32_t link) {
-  const auto [a, b] = links.pair[link];
-  const float exchange = links.exchange_area[link];
-  const auto of_a = bfloat16s(links.gradient[link].data());
-  const auto of_b = bfloat16s(links.gradient[link].data() + 3);
-  if (a == node) return {of_b, of_a, b, exchange};
-  return {of_a, of_b, a, exchange};
-}
-
-/// Which gradients a link has.
+/// Which gradients a link has, below kGradientKinds.
 int gradients_of(const IncomingLink& link) {
   return (has_gradient(link.gradient_from) ? 2 : 0) + (has_gradient(link.gradient_to) ? 1 : 0);
+}
+constexpr std::size_t kGradientKinds = 4;
+
+/// Calls `visit`(node, link) for each link and each of its nodes.
+template <typename Visit>
+void for_each_incoming(const GiveLinks& give, const Visit& visit) {
+  give([&](const NodeLink& link) {
+    visit(link.a, IncomingLink{link.gradient_b, link.gradient_a, link.b, link.exchange_area});
+    if (link.a == link.b) return;
+    visit(link.b, IncomingLink{link.gradient_a, link.gradient_b, link.a, link.exchange_area});
+  });
 }
 
 /// Checks that the nodes are in order of levels, that siblings are neighbours, and that the
@@ -131,7 +140,8 @@ static_assert(LinkedFormFactors::kBytesPerLink == 2 * sizeof(IncomingLink));
 /// The nodes and their links, in the order in which a gather visits them.
 class LinkedFormFactors::Tree {
  public:
-  Tree(const FormFactorLinks& links, std::span<const float> area, std::span<const Float3> centroid);
+  Tree(const FormFactorLinks& tree, const GiveLinks& give, std::span<const float> area,
+       std::span<const Float3> centroid);
 
   std::size_t patch_count() const { return scale_.size(); }
   std::size_t node_count() const { return node_.size(); }
@@ -156,7 +166,7 @@ class LinkedFormFactors::Tree {
                   std::span<const Float3> centroid);
   void place_children(std::span<const std::array<double, 4>> sum);
   void find_levels();
-  void sort_links(const FormFactorLinks& links);
+  void sort_links(const GiveLinks& give);
 
   template <typename Columns, typename Lanes>
   void pull(std::span<const Columns> in, LinkLightOf<Lanes>* light,
@@ -171,13 +181,13 @@ class LinkedFormFactors::Tree {
   std::vector<float> scale_;            ///< [n]
 };
 
-LinkedFormFactors::Tree::Tree(const FormFactorLinks& links, std::span<const float> area,
-                              std::span<const Float3> centroid)
-    : scale_(links.scale) {
-  check_links(links, area.size());
+LinkedFormFactors::Tree::Tree(const FormFactorLinks& tree, const GiveLinks& give,
+                              std::span<const float> area, std::span<const Float3> centroid)
+    : scale_(tree.scale) {
+  check_links(tree, area.size());
   if (centroid.size() != area.size()) refuse("centroids and areas differ in number");
-  build_tree(links, area, centroid);
-  sort_links(links);
+  build_tree(tree, area, centroid);
+  sort_links(give);
 }
 
 /// Sets areas and centres of the nodes, and their levels.
@@ -234,22 +244,21 @@ void LinkedFormFactors::Tree::find_levels() {
 }
 
 /// Sorts the links by the node that gathers, each link once for each of its two nodes, and those of
-/// a node by the gradients that they have.
-void LinkedFormFactors::Tree::sort_links(const FormFactorLinks& links) {
-  const LinksByNode of_node =
-      links_by_node(node_.size(), links.pair.size(), [&](std::size_t k) { return links.pair[k]; });
-  incoming_begin_ = of_node.offsets();
-  incoming_.reserve(incoming_begin_.back());
-  for (std::uint32_t node = 0; node < node_.size(); ++node) {
-    for (const std::uint32_t link : of_node[node]) {
-      incoming_.push_back(seen_from(node, links, link));
-    }
-    const auto first = static_cast<std::ptrdiff_t>(incoming_begin_[node]);
-    std::stable_sort(incoming_.begin() + first, incoming_.end(),
-                     [](const IncomingLink& a, const IncomingLink& b) {
-                       return gradients_of(a) < gradients_of(b);
-                     });
-  }
+/// a node by the gradients that they have: counts them first, so that each has its place.
+void LinkedFormFactors::Tree::sort_links(const GiveLinks& give) {
+  std::vector<std::uint64_t> next(kGradientKinds * node_.size() + 1, 0);
+  const auto place = [](std::uint32_t node, const IncomingLink& link) {
+    return kGradientKinds * node + static_cast<std::size_t>(gradients_of(link));
+  };
+  for_each_incoming(
+      give, [&](std::uint32_t node, const IncomingLink& link) { ++next[place(node, link) + 1]; });
+  std::partial_sum(next.begin(), next.end(), next.begin());
+  for (std::size_t k = 0; k <= node_.size(); ++k)
+    incoming_begin_.push_back(next[kGradientKinds * k]);
+  incoming_.resize(next.back());
+  for_each_incoming(give, [&](std::uint32_t node, const IncomingLink& link) {
+    incoming_[next[place(node, link)]++] = link;
+  });
 }
 
 std::size_t LinkedFormFactors::Tree::bytes() const {
@@ -327,7 +336,11 @@ void LinkedFormFactors::Tree::push(LinkLightOf<Lanes>* arrived, std::span<Column
 
 LinkedFormFactors::LinkedFormFactors(const FormFactorLinks& links, std::span<const float> area,
                                      std::span<const Float3> centroid)
-    : tree_(std::make_shared<const Tree>(links, area, centroid)) {}
+    : LinkedFormFactors(links, each_of(links), area, centroid) {}
+
+LinkedFormFactors::LinkedFormFactors(const FormFactorLinks& tree, const GiveLinks& give,
+                                     std::span<const float> area, std::span<const Float3> centroid)
+    : tree_(std::make_shared<const Tree>(tree, give, area, centroid)) {}
 
 std::size_t LinkedFormFactors::patch_count() const {
   return tree_->patch_count();

@@ -3,10 +3,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
 
+#include "transfer/base/bfloat16.h"
 #include "transfer/exchange/form_factor_operator.h"
 
 namespace rebounce {
@@ -32,6 +34,16 @@ struct FormFactorLinks {
   bool empty() const { return patch.empty(); }
 };
 
+/// One of the links of FormFactorLinks, with gradients as LinkedFormFactors stores them.
+struct NodeLink {
+  std::uint32_t a, b;
+  float exchange_area;                ///< m²
+  BFloat16x3 gradient_a, gradient_b;  ///< m
+};
+
+/// Calls its argument for each link, for the same ones in the same order whenever it is called.
+using GiveLinks = std::function<void(const std::function<void(const NodeLink&)>&)>;
+
 /// Throws Error if `links` are not a tree whose leaves are `patch_count` patches, level by level,
 /// or if a link does not join two nodes of it.
 void check_links(const FormFactorLinks& links, std::size_t patch_count);
@@ -52,6 +64,11 @@ class LinkedFormFactors final : public FormFactorOperator {
   /// `area` [n] in m², `centroid` [n] in metres. Throws Error if `links` are not a tree over n
   /// patches with links between its nodes.
   LinkedFormFactors(const FormFactorLinks& links, std::span<const float> area,
+                    std::span<const Float3> centroid);
+
+  /// The same with links that have no arrays: those of `tree` are empty, and `give` is called in
+  /// the constructor.
+  LinkedFormFactors(const FormFactorLinks& tree, const GiveLinks& give, std::span<const float> area,
                     std::span<const Float3> centroid);
 
   std::size_t patch_count() const override;

@@ -4,20 +4,22 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "transfer/base/bfloat16.h"
+
 namespace rebounce {
 
 /// A link as seen from the node that gathers along it: 20 bytes. Gradients are small corrections,
 /// so bfloat16 is precise enough for them.
 struct IncomingLink {
-  std::array<std::uint16_t, 3> gradient_from;  ///< of the exchange area over the other node, m
-  std::array<std::uint16_t, 3> gradient_to;  ///< of the exchange area over the node that gathers, m
-  std::uint32_t from;                        ///< the other node
-  float exchange_area;                       ///< m²
+  BFloat16x3 gradient_from;  ///< of the exchange area over the other node, m
+  BFloat16x3 gradient_to;    ///< of the exchange area over the node that gathers, m
+  std::uint32_t from;        ///< the other node
+  float exchange_area;       ///< m²
 };
 static_assert(sizeof(IncomingLink) == 20);
 
 /// Whether a gradient of an IncomingLink is not 0.
-constexpr bool has_gradient(const std::array<std::uint16_t, 3>& gradient) {
+constexpr bool has_gradient(const BFloat16x3& gradient) {
   return (gradient[0] | gradient[1] | gradient[2]) != 0;
 }
 

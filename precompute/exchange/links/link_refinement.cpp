@@ -11,7 +11,6 @@
 #include "precompute/base/ranks.h"
 #include "rebounce/error.h"
 #include "runtime/rays/float3_glm.h"
-#include "transfer/base/bfloat16.h"
 
 namespace rebounce {
 namespace {
@@ -32,12 +31,9 @@ constexpr std::size_t kNodesPerSample = 32;
 // error.
 constexpr double kNegligible = 0.1;
 
-/// A gradient in the precision that LinkedFormFactors stores, so that everything that is made from
-/// the links uses the same F.
-Float3 stored_gradient(const glm::dvec3& gradient) {
-  Float3 stored = to_float3(gradient);
-  for (float& g : stored) g = round_to_bfloat16(g);
-  return stored;
+BFloat16x3 stored(const glm::dvec3& gradient) {
+  const Float3 g = to_float3(gradient);
+  return to_bfloat16(g[0], g[1], g[2]);
 }
 
 bool is_plane(const LinkNode& node) {
@@ -313,8 +309,8 @@ LinkRefinement::Outcome LinkRefinement::make_link(const Candidate& pair, const P
                    .b = pair.b,
                    .exchange_area = static_cast<float>(visible.part * kernel.unoccluded()),
                    .unoccluded_area = static_cast<float>(kernel.unoccluded()),
-                   .gradient_a = stored_gradient(visible.part * kernel.gradient_a()),
-                   .gradient_b = stored_gradient(visible.part * kernel.gradient_b()),
+                   .gradient_a = stored(visible.part * kernel.gradient_a()),
+                   .gradient_b = stored(visible.part * kernel.gradient_b()),
                    .least_epsilon = static_cast<float>(std::sqrt(least_squared)),
                    .view = pair.view}};
 }

@@ -12,6 +12,7 @@
 #include "precompute/exchange/pairs/form_factor_settings.h"
 #include "precompute/exchange/pairs/shadow_rays.h"
 #include "runtime/rays/ray_tracer.h"
+#include "transfer/base/bfloat16.h"
 
 namespace rebounce {
 
@@ -20,9 +21,9 @@ namespace rebounce {
 ///   (exchange_area + gradient_a . (x - center_a) + gradient_b . (y - center_b)) / (area_a area_b).
 struct Link {
   std::uint32_t a, b;
-  float exchange_area;            ///< m²
-  float unoccluded_area;          ///< m²: the exchange area with nothing between, the upper limit
-  Float3 gradient_a, gradient_b;  ///< m
+  float exchange_area;    ///< m²
+  float unoccluded_area;  ///< m²: the exchange area with nothing between, the upper limit
+  BFloat16x3 gradient_a, gradient_b;  ///< m; so LinkedFormFactors stores them too
   float variance = 0;  ///< m⁴, of the exchange area of two patches; of nodes it is not known
   float measured_area = -1;  ///< m²: that of two patches before closure; below 0: not measured
   float least_epsilon = 0;   ///< the link is near enough where epsilon is above this

@@ -69,10 +69,10 @@ std::vector<Moments> pull(const LinkTree& tree, std::span<const double> x) {
 std::vector<Moments> gather_nodes(const std::vector<Moments>& mean, std::span<const Link> links) {
   std::vector<Moments> arrived(mean.size());
   const auto add = [&](std::uint32_t to, std::uint32_t from, double exchange,
-                       const Float3& gradient_to, const Float3& gradient_from) {
+                       const BFloat16x3& gradient_to, const BFloat16x3& gradient_from) {
     arrived[to].sum +=
-        exchange * mean[from].sum + glm::dot(to_dvec3(gradient_from), mean[from].first);
-    arrived[to].first += mean[from].sum * to_dvec3(gradient_to);
+        exchange * mean[from].sum + glm::dot(to_dvec3(to_floats(gradient_from)), mean[from].first);
+    arrived[to].first += mean[from].sum * to_dvec3(to_floats(gradient_to));
   };
   for (const Link& link : links) {
     add(link.a, link.b, link.exchange_area, link.gradient_a, link.gradient_b);
@@ -262,8 +262,8 @@ LinkScaling scale_links(const LinkTree& tree, std::span<Link> links,
                         std::span<const RowSumTarget> target) {
   LinkScaling result;
   std::vector<double>&factor = result.factor, &row = result.row_sum;
-  const auto middle = std::stable_partition(
-      links.begin(), links.end(), [&](const Link& link) { return is_certain(tree, link); });
+  const auto middle = std::partition(links.begin(), links.end(),
+                                     [&](const Link& link) { return is_certain(tree, link); });
   const auto certain_count = static_cast<std::size_t>(middle - links.begin());
   const std::span certain = links.first(certain_count), rest = links.subspan(certain_count);
   row = gather_links(tree, links, std::vector<double>(target.size(), 1.0));

@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <tuple>
 #include <utility>
+
+#include "rebounce/error.h"
 
 namespace rebounce {
 namespace {
@@ -24,6 +27,20 @@ using Range = std::span<const Member>;
 float dot(const float* gradient, const Float3& point, const Float3& center) {
   return gradient[0] * (point[0] - center[0]) + gradient[1] * (point[1] - center[1]) +
          gradient[2] * (point[2] - center[2]);
+}
+
+/// The links of each node. A link is listed at both of its nodes.
+Grouped<std::uint64_t> links_of_nodes(const FormFactorLinks& links) {
+  if (links.pair.size() > std::numeric_limits<std::uint32_t>::max()) {
+    throw Error("links: more than 4294967295 cannot be used; ask for fewer patches");
+  }
+  return {links.first_child.size(), [&](const auto& add) {
+            for (std::uint32_t k = 0; k < links.pair.size(); ++k) {
+              const auto [a, b] = links.pair[k];
+              add(a, k);
+              if (a != b) add(b, k);
+            }
+          }};
 }
 
 }  // namespace
@@ -140,8 +157,7 @@ LinkedMatrix::LinkedMatrix(const FormFactorLinks& links,
       patches_(patches),
       product_(std::move(product)),
       position_(patches.size()),
-      links_of_node_(links_by_node(links.first_child.size(), links.pair.size(),
-                                   [&](std::size_t k) { return links.pair[k]; })) {
+      links_of_node_(links_of_nodes(links)) {
   for (std::uint32_t k = 0; k < links.patch.size(); ++k) position_[links.patch[k]] = k;
   measure_nodes();
   sort_links();

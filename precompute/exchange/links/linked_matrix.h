@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "precompute/base/symmetric_matrix.h"
+#include "transfer/base/grouped.h"
 #include "transfer/exchange/linked_form_factors.h"
-#include "transfer/exchange/links_by_node.h"
 #include "transfer/file/transfer_data.h"
 
 namespace rebounce {
@@ -56,9 +56,9 @@ class LinkedMatrix final : public SymmetricMatrix {
   const FormFactorLinks& links_;
   const PatchTable& patches_;
   std::shared_ptr<const LinkedFormFactors> product_;
-  std::vector<std::uint32_t> position_;  ///< [n] position of each patch
-  std::vector<Node> nodes_;              ///< [m]
-  LinksByNode links_of_node_;            ///< of each node, by where they lead
+  std::vector<std::uint32_t> position_;   ///< [n] position of each patch
+  std::vector<Node> nodes_;               ///< [m]
+  Grouped<std::uint64_t> links_of_node_;  ///< of each node, by where they lead
 };
 
 }  // namespace rebounce

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
+#include <vector>
 
 #include "precompute/base/progress.h"
 #include "precompute/exchange/links/refined_links.h"
@@ -36,19 +38,41 @@ class LinkBuilder {
   LinkBuilder(const LinkBuilder&) = delete;
   LinkBuilder& operator=(const LinkBuilder&) = delete;
 
-  /// The links for `epsilon`, in place of settings.link_epsilon. When called again, links that are
-  /// near enough stay, so that it takes a part of the time. Throws Error if epsilon is not above 0
-  /// or not below the last one, Cancelled if `progress` asks to stop.
-  LinkBuild build(double epsilon, const Progress& progress = {});
+  /// Finds the links for `epsilon`, in place of settings.link_epsilon, and returns their number.
+  /// When called again, links that are near enough stay, so that it takes a part of the time.
+  /// Throws Error if epsilon is not above 0 or not below the last one, Cancelled if `progress` asks
+  /// to stop.
+  std::size_t find(double epsilon, const Progress& progress = {});
+
+  /// The links that were found last.
+  LinkBuild result() const;
+
+  /// The same after find().
+  LinkBuild build(double epsilon, const Progress& progress = {}) {
+    find(epsilon, progress);
+    return result();
+  }
+
+  /// What result() has, without a copy of the links.
+  const EscapedLight& escaped() const { return escaped_; }
+  std::shared_ptr<const LinkedFormFactors> form_factors() const;
 
   /// Memory that is kept for finer links.
   std::uint64_t held_bytes() const { return links_.held_bytes(); }
 
  private:
+  FormFactorLinks tree() const;
+  std::size_t link_count() const;
+
+  const PatchModel& model_;
   const PatchGeometry geometry_;
   const ShadowRays shadow_rays_;
   RefinedLinks links_;
-  double epsilon_ = 0;  ///< of the last links
+  // Of the last links:
+  double epsilon_ = 0;
+  std::vector<double> factor_;  ///< [n] of each patch
+  ClosureReport closure_;
+  EscapedLight escaped_;
 };
 
 }  // namespace rebounce

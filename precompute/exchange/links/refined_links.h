@@ -30,6 +30,7 @@ class RefinedLinks {
   const LinkTree& tree() const { return tree_; }
   /// Closure may change the exchange areas.
   std::span<Link> links() { return refinement_.links(); }
+  std::span<const Link> links() const { return refinement_.links(); }
   std::span<const Escape> escape() const { return hemispheres_.escape(); }  ///< [n]
   /// Of row sums [n].
   std::span<const RowSumTarget> target() const { return target_; }

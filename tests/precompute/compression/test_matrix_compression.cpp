@@ -65,7 +65,7 @@ TEST(MatrixCompression, PositionsThatAJoinedLightShinesOnAloneAreRoundedMoreFine
     const std::vector<Float3> light = light_on(patch);
     MatrixCompression compression(dark, room().patches, training, {}, options);
     const Compressed first = compress(compression, light);
-    const ReferenceLighting joined(dark, std::span(&light, 1));
+    const ReferenceLighting joined(dark, {light});
     compression.add_training_light(joined, 0);
     const Compressed second = compress(compression, light);
     const std::vector<std::int8_t>&old = first.exact.scale_exponent,
@@ -96,7 +96,7 @@ TEST(MatrixCompression, ALightThatShinesEverywhereLeavesTheScalesAsTheyAre) {
   MatrixCompression compression(matrix, room().patches, training, {},
                                 {.equilibrated = true, .nested = true});
   const auto before = compress(compression, light).exact.scale_exponent;
-  compression.add_training_light(ReferenceLighting(matrix, std::span(&light, 1)), 0);
+  compression.add_training_light(ReferenceLighting(matrix, {light}), 0);
   EXPECT_EQ(compress(compression, light).exact.scale_exponent, before);
 }
 
