@@ -53,17 +53,20 @@ constexpr std::size_t kBufferBytesOfPatch = 24'000, kBufferBytes = 11'000'000,
 // Copies of the factors of a low-rank operator while they are found.
 constexpr std::size_t kFactorCopies = 6;
 
-// A link during refinement: the link, its copy, and what its rays are counted in or the flat
-// arrays.
-constexpr std::size_t kLinkBytesFound = 140;
+// A link while links are found: the link, and what its rays are counted in or what gathers along it
+// when it is checked (lab/167).
+constexpr std::size_t kLinkBytesFound = 95;
 // A patch then, as from pairs.
 constexpr std::size_t kPatchBytesOfLinks = 17'500;
 
-// A link afterwards: its flat arrays, the gathering order by both nodes, and fewer links.
+// A link afterwards: what gathers along it; and, while form factors are compressed, its flat arrays
+// and its number at both nodes too.
 constexpr std::size_t kFlatLinkBytes = sizeof(FormFactorLinks{}.pair[0]) +
                                        sizeof(FormFactorLinks{}.exchange_area[0]) +
                                        sizeof(FormFactorLinks{}.gradient[0]);
-constexpr std::size_t kLinkBytesKept = kFlatLinkBytes + LinkedFormFactors::kBytesPerLink + 14;
+constexpr std::size_t kLinkBytesKept = LinkedFormFactors::kBytesPerLink;
+constexpr std::size_t kLinkBytesCompressed =
+    kFlatLinkBytes + kLinkBytesKept + 2 * sizeof(std::uint32_t);
 
 // How many more links there are once those that are too coarse have been made finer, as a part of
 // those that are forecast: between none and 1.4 times, by the scene. What is said lies in between
@@ -77,8 +80,8 @@ constexpr double kPatchesOfSquare = 2;
 // More patches than any build has room for.
 constexpr double kNoRoom = 1e15;
 
-// A patch beside links: compressed form factors and what they are fitted to, without the lights.
-constexpr std::size_t kPatchBytes = 3000;
+// A patch beside links, with its compressed form factors (lab/167).
+constexpr std::size_t kPatchBytes = 9000;
 
 std::string in_gib(std::uint64_t bytes) {
   return fmt::format("{:.3g} GiB", static_cast<double>(bytes) / (1ULL << 30));
@@ -110,6 +113,12 @@ double least_patch_count(const Scene& scene, const SubdivisionSettings& settings
 std::uint64_t bytes_beside_transfer(const LinkedBuild& build) {
   return build.held_bytes + kPatchBytes * build.scene.patch_count +
          kLinkBytesKept * build.link_count;
+}
+
+/// While form factors are compressed.
+std::uint64_t peak_bytes_of_compression(const LinkedBuild& build) {
+  return build.held_bytes + form_factor_compression_bytes(build.scene.patch_count) +
+         kLinkBytesCompressed * build.link_count;
 }
 
 std::uint64_t bytes_of_libraries(std::size_t patch_count) {
@@ -200,9 +209,9 @@ std::uint64_t peak_bytes_of_links(const LinkedBuild& build) {
 }
 
 std::uint64_t peak_bytes_after_links(const LinkedBuild& build, std::uint64_t limit_bytes) {
-  return bytes_beside_transfer(build) +
-         std::max({plan_after_links(build, limit_bytes).peak_bytes, bytes_of_weights(build.scene),
-                   build.scene.row_bytes});
+  const std::uint64_t beside = std::max({plan_after_links(build, limit_bytes).peak_bytes,
+                                         bytes_of_weights(build.scene), build.scene.row_bytes});
+  return std::max(peak_bytes_of_compression(build), bytes_beside_transfer(build) + beside);
 }
 
 int thread_count_after_links(const LinkedBuild& build, std::uint64_t limit_bytes) {

@@ -28,6 +28,9 @@ constexpr double kCouplingBytes = 1.3;
 // the light that they are judged by (lab/114).
 constexpr std::size_t kSearchBytes = 7000;
 
+// Of OpenBLAS, for each thread but the first (lab/162).
+constexpr std::size_t kBlasBytes = 12'000'000;
+
 // Of blocks that are at work while an operator is compressed (lab/114, lab/162).
 std::size_t work_bytes(std::size_t patch_count) {
   constexpr std::size_t kOfPatch = 16000, kMost = 8'000'000;
@@ -39,8 +42,6 @@ std::size_t work_bytes(std::size_t patch_count) {
 MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::size_t matrix_count,
                                                  const MatrixFreeTransferSettings& settings,
                                                  std::uint64_t coupling_count) {
-  // Of OpenBLAS, for each thread but the first (lab/162).
-  constexpr std::size_t kBlasBytes = 12'000'000;
   constexpr std::size_t kGroupsOfThread = 4;  // of a run, so that all threads end together
   constexpr std::size_t kVectors = 9;         // what is sent, those of the solver, coefficients
   constexpr std::size_t kBatchColumns = SolvedTransfer::kBatchColumns;
@@ -73,6 +74,13 @@ std::uint64_t dense_compression_peak_bytes(std::size_t patch_count, std::size_t 
   const std::uint64_t triangle = static_cast<std::uint64_t>(patch_count) * patch_count / 2;
   return triangle * sizeof(float) * matrix_count +
          patch_count * (kFittingLightBytes + kSearchBytes) + work_bytes(patch_count);
+}
+
+std::uint64_t form_factor_compression_bytes(std::size_t patch_count) {
+  constexpr std::size_t kOfPatch = 19'000;  // lab/167
+  const auto threads = static_cast<std::size_t>(omp_get_max_threads());
+  return patch_count * (kFittingLightBytes + kOfPatch) + work_bytes(patch_count) +
+         (threads - 1) * kBlasBytes;
 }
 
 /// Throws Error if there is a memory limit and a plan does not fit into it.

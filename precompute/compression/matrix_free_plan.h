@@ -41,6 +41,9 @@ MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::s
 /// Peak memory of compressing a dense operator (f32) to a hierarchical one, with the dense one.
 std::uint64_t dense_compression_peak_bytes(std::size_t patch_count, std::size_t matrix_count);
 
+/// Memory of compressing form factors from links, beside the links.
+std::uint64_t form_factor_compression_bytes(std::size_t patch_count);
+
 /// Throws Error if the plan for so many patches is above the limit of `settings`.
 void check_memory(std::size_t patch_count, const MatrixFreeTransferPlan& plan,
                   const MatrixFreeTransferSettings& settings);
