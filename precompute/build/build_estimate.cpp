@@ -80,8 +80,9 @@ constexpr double kPatchesOfSquare = 2;
 // More patches than any build has room for.
 constexpr double kNoRoom = 1e15;
 
-// A patch beside links, with its compressed form factors (lab/167).
-constexpr std::size_t kPatchBytes = 9000;
+// A patch beside links, with its compressed form factors, up to as many entries as there are pairs
+// (lab/167).
+constexpr std::size_t kPatchBytes = 9000, kPatchBytesOfPair = 4;
 
 std::string in_gib(std::uint64_t bytes) {
   return fmt::format("{:.3g} GiB", static_cast<double>(bytes) / (1ULL << 30));
@@ -111,7 +112,8 @@ double least_patch_count(const Scene& scene, const SubdivisionSettings& settings
 }
 
 std::uint64_t bytes_beside_transfer(const LinkedBuild& build) {
-  return build.held_bytes + kPatchBytes * build.scene.patch_count +
+  const std::size_t n = build.scene.patch_count;
+  return build.held_bytes + std::min(kPatchBytes, kPatchBytesOfPair * n) * n +
          kLinkBytesKept * build.link_count;
 }
 

@@ -77,10 +77,12 @@ std::uint64_t dense_compression_peak_bytes(std::size_t patch_count, std::size_t 
 }
 
 std::uint64_t form_factor_compression_bytes(std::size_t patch_count) {
-  constexpr std::size_t kOfPatch = 19'000;  // lab/167
+  // Candidates of the search, up to as many entries as there are pairs (lab/167).
+  constexpr std::size_t kOfPair = 7, kOfPatch = 14'700, kAtLeast = 53'000'000;
+  const std::size_t candidates =
+      std::min(kOfPair * patch_count * patch_count, kAtLeast + kOfPatch * patch_count);
   const auto threads = static_cast<std::size_t>(omp_get_max_threads());
-  return patch_count * (kFittingLightBytes + kOfPatch) + work_bytes(patch_count) +
-         (threads - 1) * kBlasBytes;
+  return kFittingLightBytes * patch_count + candidates + (threads - 1) * kBlasBytes;
 }
 
 /// Throws Error if there is a memory limit and a plan does not fit into it.
