@@ -250,8 +250,10 @@ void LinkedFormFactors::Tree::sort_links(const GiveLinks& give) {
   const auto place = [](std::uint32_t node, const IncomingLink& link) {
     return kGradientKinds * node + static_cast<std::size_t>(gradients_of(link));
   };
-  for_each_incoming(
-      give, [&](std::uint32_t node, const IncomingLink& link) { ++next[place(node, link) + 1]; });
+  for_each_incoming(give, [&](std::uint32_t node, const IncomingLink& link) {
+    if (node >= node_.size()) refuse("a link joins a node that does not exist");
+    ++next[place(node, link) + 1];
+  });
   std::partial_sum(next.begin(), next.end(), next.begin());
   for (std::size_t k = 0; k <= node_.size(); ++k)
     incoming_begin_.push_back(next[kGradientKinds * k]);

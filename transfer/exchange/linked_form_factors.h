@@ -67,7 +67,7 @@ class LinkedFormFactors final : public FormFactorOperator {
                     std::span<const Float3> centroid);
 
   /// The same with links that have no arrays: those of `tree` are empty, and `give` is called in
-  /// the constructor.
+  /// the constructor. Exchange areas and gradients must be finite.
   LinkedFormFactors(const FormFactorLinks& tree, const GiveLinks& give, std::span<const float> area,
                     std::span<const Float3> centroid);
 

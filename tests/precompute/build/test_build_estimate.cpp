@@ -70,7 +70,7 @@ TEST(BuildEstimate, TakesTheMemoryThatIsLeft) {
 }
 
 TEST(BuildEstimate, GrowsWithEverythingAndFallsWithReceiversAndSources) {
-  const LinkedBuild build{.scene = {30000}, .link_count = 5'000'000, .matrix_count = 1};
+  const LinkedBuild build{.scene = {30000}, .link_count = 5'000'000, .matrix_count = 2};
   const auto bytes = [](const LinkedBuild& b) { return peak_bytes_after_links(b, kPlenty); };
   LinkedBuild larger = build, denser = build, coloured = build, finer = build, part = build;
   larger.scene.patch_count *= 2;

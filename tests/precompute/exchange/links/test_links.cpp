@@ -193,6 +193,19 @@ TEST(Links, AreMadeFinerFromCoarserOnes) {
   EXPECT_LT(error(finer), 1.1 * error(alone));
 }
 
+TEST(Links, GatherWithoutACopyOfTheirs) {
+  const PatchModel model = model_of(test::furnished_room(), 300);
+  const RayTracer tracer = test::make_tracer(model);
+  LinkBuilder builder(model, tracer, {});
+  const std::size_t count = builder.find(kLinkEpsilon);
+  const LinkBuild build = builder.result();
+  EXPECT_EQ(count, build.links.pair.size());
+  EXPECT_EQ(builder.escaped().sky_visibility, build.sky_visibility);
+  const std::vector<Float3> light = smooth_light(model.patches);
+  EXPECT_EQ(gather(*builder.form_factors(), light),
+            gather(operator_of(build, model.patches), light));
+}
+
 TEST(Links, AreForecastFromASample) {
   // More pairs of nodes than the sample in most generations.
   const auto& [model, build, pairs] = furnished();
