@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <functional>
-#include <ranges>
 #include <utility>
 
 #include "precompute/exchange/links/link_scaling.h"
@@ -66,7 +65,8 @@ LinkBuild LinkBuilder::result() const {
   build.links.pair.reserve(count);
   build.links.exchange_area.reserve(count);
   build.links.gradient.reserve(count);
-  for (const Link& link : links_.links() | std::views::filter(exchanges)) {
+  for (const Link& link : links_.links()) {
+    if (!exchanges(link)) continue;
     const Float3 g = to_floats(link.gradient_a), h = to_floats(link.gradient_b);
     build.links.pair.push_back({link.a, link.b});
     build.links.exchange_area.push_back(link.exchange_area);
@@ -82,7 +82,8 @@ std::size_t LinkBuilder::link_count() const {
 
 std::shared_ptr<const LinkedFormFactors> LinkBuilder::form_factors() const {
   const GiveLinks give = [&](const std::function<void(const NodeLink&)>& take) {
-    for (const Link& link : links_.links() | std::views::filter(exchanges)) {
+    for (const Link& link : links_.links()) {
+      if (!exchanges(link)) continue;
       take({link.a, link.b, link.exchange_area, link.gradient_a, link.gradient_b});
     }
   };
