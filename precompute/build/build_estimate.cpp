@@ -59,14 +59,12 @@ constexpr std::size_t kLinkBytesFound = 95;
 // A patch then, as from pairs.
 constexpr std::size_t kPatchBytesOfLinks = 17'500;
 
-// A link afterwards: what gathers along it; and, while form factors are compressed, its flat arrays
-// and its number at both nodes too.
+// A link afterwards: what gathers along it; and, while that is made, its flat arrays too.
 constexpr std::size_t kFlatLinkBytes = sizeof(FormFactorLinks{}.pair[0]) +
                                        sizeof(FormFactorLinks{}.exchange_area[0]) +
                                        sizeof(FormFactorLinks{}.gradient[0]);
 constexpr std::size_t kLinkBytesKept = LinkedFormFactors::kBytesPerLink;
-constexpr std::size_t kLinkBytesCompressed =
-    kFlatLinkBytes + kLinkBytesKept + 2 * sizeof(std::uint32_t);
+constexpr std::size_t kLinkBytesCopied = kFlatLinkBytes + kLinkBytesKept;
 
 // How many more links there are once those that are too coarse have been made finer, as a part of
 // those that are forecast: between none and 1.4 times, by the scene. What is said lies in between
@@ -117,10 +115,12 @@ std::uint64_t bytes_beside_transfer(const LinkedBuild& build) {
          kLinkBytesKept * build.link_count;
 }
 
-/// While form factors are compressed.
-std::uint64_t peak_bytes_of_compression(const LinkedBuild& build) {
-  return build.held_bytes + form_factor_compression_bytes(build.scene.patch_count) +
-         kLinkBytesCompressed * build.link_count;
+/// While links become what gathers along them, and then while form factors are compressed.
+std::uint64_t peak_bytes_of_form_factors(const LinkedBuild& build) {
+  return build.held_bytes +
+         std::max(kLinkBytesCopied * build.link_count,
+                  kLinkBytesKept * build.link_count +
+                      form_factor_compression_bytes(build.scene.patch_count));
 }
 
 std::uint64_t bytes_of_libraries(std::size_t patch_count) {
@@ -213,7 +213,7 @@ std::uint64_t peak_bytes_of_links(const LinkedBuild& build) {
 std::uint64_t peak_bytes_after_links(const LinkedBuild& build, std::uint64_t limit_bytes) {
   const std::uint64_t beside = std::max({plan_after_links(build, limit_bytes).peak_bytes,
                                          bytes_of_weights(build.scene), build.scene.row_bytes});
-  return std::max(peak_bytes_of_compression(build), bytes_beside_transfer(build) + beside);
+  return std::max(peak_bytes_of_form_factors(build), bytes_beside_transfer(build) + beside);
 }
 
 int thread_count_after_links(const LinkedBuild& build, std::uint64_t limit_bytes) {

@@ -115,13 +115,11 @@ class LinkedOperator {
         clock_(clock) {}
 
   std::vector<KindError> make(std::span<const std::uint32_t> shown_patch) {
-    FormFactorLinks fewer = clock_.run("fewer links", [&](const Progress& part) {
-      return fit_links(data_.links, data_.patches, kErrorPerLink, part);
-    });
+    FormFactorLinks fewer = fewer_links();
     find_fitting_lights(fewer);
     if (!decided_.store_links) fewer = {};
     compress_form_factors_of();
-    data_.links = std::move(fewer);  // the others are in `links_`
+    data_.links = std::move(fewer);
     make_operator();
     check(decided_.form_factors.seed);
     const double finer = finer_tolerance(data_.record);
@@ -139,6 +137,18 @@ class LinkedOperator {
  private:
   double tolerance() const { return kCompressionPart * decided_.tolerance; }
 
+  /// Takes the links of the data into `links_`; their tree stays. Returns those that are enough for
+  /// fitting.
+  FormFactorLinks fewer_links() {
+    link_count_ = data_.links.pair.size();
+    return clock_.run("fewer links", [&](const Progress& part) {
+      links_ = std::make_shared<const LinkedFormFactors>(data_.links, data_.patches.area,
+                                                         data_.patches.centroid);
+      data_.links.drop_links();
+      return fit_links(data_.links, links_, data_.patches, kErrorPerLink, part);
+    });
+  }
+
   void find_fitting_lights(const FormFactorLinks& fewer) {
     lights_ = clock_.run("fitting lights", [&](const Progress& part) {
       // The third digit of the radiosities does not matter here.
@@ -152,9 +162,6 @@ class LinkedOperator {
   }
 
   void compress_form_factors_of() {
-    link_count_ = data_.links.pair.size();
-    links_ = std::make_shared<const LinkedFormFactors>(data_.links, data_.patches.area,
-                                                       data_.patches.centroid);
     data_.compressed_form_factors =
         clock_.run("form factor compression", [&](const Progress& part) {
           return compress_form_factors(data_.links, links_, data_.patches,
@@ -227,7 +234,7 @@ class LinkedOperator {
   BuildReport& report_;
   PhaseClock& clock_;
   std::size_t link_count_ = 0;
-  std::shared_ptr<const LinkedFormFactors> links_;  ///< from their compression to the last check
+  std::shared_ptr<const LinkedFormFactors> links_;
   FittedLights lights_;
   std::optional<MatrixFreeTransfer> solved_;
   std::optional<CorrectedSolver> solver_;  ///< that the last check has used

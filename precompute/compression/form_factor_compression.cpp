@@ -28,18 +28,10 @@ std::shared_ptr<const HierarchicalOperator> compress_form_factors(
 }
 
 std::shared_ptr<const HierarchicalOperator> compress_form_factors(
-    const FormFactorLinks& links, const PatchTable& patches, const FittingLights& radiosities,
-    const HierarchicalSettings& settings, const Progress& progress) {
-  return compress_form_factors(
-      links, std::make_shared<const LinkedFormFactors>(links, patches.area, patches.centroid),
-      patches, radiosities, settings, progress);
-}
-
-std::shared_ptr<const HierarchicalOperator> compress_form_factors(
-    const FormFactorLinks& links, std::shared_ptr<const LinkedFormFactors> product,
+    const FormFactorLinks& tree, std::shared_ptr<const LinkedFormFactors> links,
     const PatchTable& patches, const FittingLights& radiosities,
     const HierarchicalSettings& settings, const Progress& progress) {
-  return compress_to_tolerance(LinkedMatrix(links, std::move(product), patches), patches,
+  return compress_to_tolerance(LinkedMatrix(tree, std::move(links), patches), patches,
                                copies_of(radiosities), without_cluster_bases(settings), progress);
 }
 

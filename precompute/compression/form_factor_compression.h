@@ -23,16 +23,11 @@ std::shared_ptr<const HierarchicalOperator> compress_form_factors(
     const ExchangeMatrix& exchange, const PatchTable& patches, const FittingLights& radiosities,
     const HierarchicalSettings& settings, const Progress& progress = {});
 
-/// The same from links, without storing the pairs that they stand for. Each multiplier that is
-/// tried reads every entry once; the memory is that of a few pieces of the matrix. Throws Error if
-/// `links` are not of these patches.
+/// The same from links, without storing the pairs that they stand for. `tree` is that of `links`;
+/// its own links are not read. Each multiplier that is tried reads every entry once; the memory is
+/// that of a few pieces of the matrix.
 std::shared_ptr<const HierarchicalOperator> compress_form_factors(
-    const FormFactorLinks& links, const PatchTable& patches, const FittingLights& radiosities,
-    const HierarchicalSettings& settings, const Progress& progress = {});
-
-/// The same with `product`, a gathering operator of the same links that the caller shares.
-std::shared_ptr<const HierarchicalOperator> compress_form_factors(
-    const FormFactorLinks& links, std::shared_ptr<const LinkedFormFactors> product,
+    const FormFactorLinks& tree, std::shared_ptr<const LinkedFormFactors> links,
     const PatchTable& patches, const FittingLights& radiosities,
     const HierarchicalSettings& settings, const Progress& progress = {});
 

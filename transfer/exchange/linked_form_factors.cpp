@@ -22,6 +22,9 @@ namespace {
 // Nodes per task of pull and push, and of gathering.
 constexpr std::size_t kNodesPerTask = 2048, kGatheredPerTask = 128;
 
+// Lists of links, of which a node has one for each kind of gradients, per task of sorting.
+constexpr std::size_t kSortedPerTask = 512;
+
 /// The fastest function that gathers `Columns` along links on this processor.
 template <typename Columns>
 GatherAlongLinks<Columns> fastest_gather() {
@@ -44,12 +47,6 @@ GiveLinks each_of(const FormFactorLinks& links) {
     }
   };
 }
-
-/// Which gradients a link has, below kGradientKinds.
-int gradients_of(const IncomingLink& link) {
-  return (has_gradient(link.gradient_from) ? 2 : 0) + (has_gradient(link.gradient_to) ? 1 : 0);
-}
-constexpr std::size_t kGradientKinds = 4;
 
 /// Calls `visit`(node, link) for each link and each of its nodes.
 template <typename Visit>
@@ -146,6 +143,10 @@ class LinkedFormFactors::Tree {
   std::size_t patch_count() const { return scale_.size(); }
   std::size_t node_count() const { return node_.size(); }
   std::size_t bytes() const;
+  std::span<const IncomingLink> incoming(std::size_t node) const {
+    return std::span(incoming_).subspan(incoming_begin_[node],
+                                        incoming_begin_[node + 1] - incoming_begin_[node]);
+  }
 
   /// Pulls, gathers and pushes; `light` and `arrived` are workspace [m].
   template <typename Columns, typename Lanes>
@@ -166,7 +167,7 @@ class LinkedFormFactors::Tree {
                   std::span<const Float3> centroid);
   void place_children(std::span<const std::array<double, 4>> sum);
   void find_levels();
-  void sort_links(const GiveLinks& give);
+  void sort_links(const GiveLinks& give, std::span<const std::uint32_t> first_position);
 
   template <typename Columns, typename Lanes>
   void pull(std::span<const Columns> in, LinkLightOf<Lanes>* light,
@@ -187,7 +188,7 @@ LinkedFormFactors::Tree::Tree(const FormFactorLinks& tree, const GiveLinks& give
   check_links(tree, area.size());
   if (centroid.size() != area.size()) refuse("centroids and areas differ in number");
   build_tree(tree, area, centroid);
-  sort_links(give);
+  sort_links(give, first_positions(tree));
 }
 
 /// Sets areas and centres of the nodes, and their levels.
@@ -243,12 +244,14 @@ void LinkedFormFactors::Tree::find_levels() {
   }
 }
 
-/// Sorts the links by the node that gathers, each link once for each of its two nodes, and those of
-/// a node by the gradients that they have: counts them first, so that each has its place.
-void LinkedFormFactors::Tree::sort_links(const GiveLinks& give) {
+/// Places the links by the node that gathers, each link once for each of its two nodes, and those
+/// of a node by the gradients that they have: counts them first, so that each has its place. Then
+/// sorts the links of a node that have the same gradients by the first position of where they lead.
+void LinkedFormFactors::Tree::sort_links(const GiveLinks& give,
+                                         std::span<const std::uint32_t> first_position) {
   std::vector<std::uint64_t> next(kGradientKinds * node_.size() + 1, 0);
   const auto place = [](std::uint32_t node, const IncomingLink& link) {
-    return kGradientKinds * node + static_cast<std::size_t>(gradients_of(link));
+    return std::size_t{kGradientKinds} * node + gradients_of(link);
   };
   for_each_incoming(give, [&](std::uint32_t node, const IncomingLink& link) {
     if (node >= node_.size()) refuse("a link joins a node that does not exist");
@@ -260,6 +263,14 @@ void LinkedFormFactors::Tree::sort_links(const GiveLinks& give) {
   incoming_.resize(next.back());
   for_each_incoming(give, [&](std::uint32_t node, const IncomingLink& link) {
     incoming_[next[place(node, link)]++] = link;
+  });
+  // Each place has moved to the end of its links.
+  parallel_for_pieces({}, next.size() - 1, kSortedPerTask, [&](std::size_t k) {
+    const auto at = [&](std::size_t end) {
+      return incoming_.begin() + static_cast<std::ptrdiff_t>(end);
+    };
+    std::ranges::sort(at(k == 0 ? 0 : next[k - 1]), at(next[k]), {},
+                      [&](const IncomingLink& link) { return first_position[link.from]; });
   });
 }
 
@@ -354,6 +365,10 @@ std::size_t LinkedFormFactors::node_count() const {
 
 std::size_t LinkedFormFactors::bytes() const {
   return tree_->bytes();
+}
+
+std::span<const IncomingLink> LinkedFormFactors::incoming(std::uint32_t node) const {
+  return tree_->incoming(node);
 }
 
 std::size_t LinkedFormFactors::workspace_size() const {

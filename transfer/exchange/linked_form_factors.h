@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "transfer/base/bfloat16.h"
+#include "transfer/base/incoming_link.h"
 #include "transfer/exchange/form_factor_operator.h"
 
 namespace rebounce {
@@ -32,6 +33,13 @@ struct FormFactorLinks {
   std::vector<float> scale;
 
   bool empty() const { return patch.empty(); }
+
+  /// Frees the links; the tree and the scales stay.
+  void drop_links() {
+    pair = {};
+    exchange_area = {};
+    gradient = {};
+  }
 };
 
 /// One of the links of FormFactorLinks, with gradients as LinkedFormFactors stores them.
@@ -75,6 +83,11 @@ class LinkedFormFactors final : public FormFactorOperator {
   std::size_t node_count() const;
   std::size_t bytes() const override;
   std::size_t workspace_size() const override;
+
+  /// The links of a node, by the gradients that they have (gradients_of), then by the first
+  /// position of the nodes that they lead to.
+  std::span<const IncomingLink> incoming(std::uint32_t node) const;
+
   using FormFactorOperator::gather;
 
   /// Gathers several lights at once. `Columns` is an array of 3 or 24 floats or doubles: the

@@ -2,26 +2,10 @@
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
 
-#include "transfer/base/bfloat16.h"
+#include "transfer/base/incoming_link.h"
 
 namespace rebounce {
-
-/// A link as seen from the node that gathers along it: 20 bytes. Gradients are small corrections,
-/// so bfloat16 is precise enough for them.
-struct IncomingLink {
-  BFloat16x3 gradient_from;  ///< of the exchange area over the other node, m
-  BFloat16x3 gradient_to;    ///< of the exchange area over the node that gathers, m
-  std::uint32_t from;        ///< the other node
-  float exchange_area;       ///< m²
-};
-static_assert(sizeof(IncomingLink) == 20);
-
-/// Whether a gradient of an IncomingLink is not 0.
-constexpr bool has_gradient(const BFloat16x3& gradient) {
-  return (gradient[0] | gradient[1] | gradient[2]) != 0;
-}
 
 // Three colour channels and one unused float, so that a colour is a vector.
 inline constexpr std::size_t kColorLanes = 4;

@@ -104,21 +104,19 @@ void append_link(const AffineLink& link, FormFactorLinks& links) {
   }
 }
 
-AffineLink affine_link(const FormFactorLinks& links, std::size_t l) {
-  const auto& g = links.gradient[l];
-  return {.a = links.pair[l][0],
-          .b = links.pair[l][1],
-          .exchange = links.exchange_area[l],
-          .gradient_a = {g[0], g[1], g[2]},
-          .gradient_b = {g[3], g[4], g[5]}};
+AffineLink affine_link(std::uint32_t to, const IncomingLink& link) {
+  const Float3 a = to_floats(link.gradient_to), b = to_floats(link.gradient_from);
+  return {.a = to,
+          .b = link.from,
+          .exchange = link.exchange_area,
+          .gradient_a = {a[0], a[1], a[2]},
+          .gradient_b = {b[0], b[1], b[2]}};
 }
 
-std::vector<float> row_sums(const FormFactorLinks& links, std::span<const float> area,
-                            std::span<const Float3> centroid) {
+std::vector<float> row_sums(const LinkedFormFactors& links) {
   std::vector<float> sums;
-  sums.reserve(area.size());
-  for (const Float3& sum : gather(LinkedFormFactors(links, area, centroid),
-                                  std::vector<Float3>(area.size(), {1, 1, 1}))) {
+  sums.reserve(links.patch_count());
+  for (const Float3& sum : gather(links, std::vector<Float3>(links.patch_count(), {1, 1, 1}))) {
     sums.push_back(sum[0]);
   }
   return sums;
@@ -131,7 +129,7 @@ void scale_rows(std::span<const float> target, std::span<const float> area,
   }
   std::vector<float> scaled(target.size(), 1);  // with the factors of this function
   for (int round = 0; round < kScalingRounds; ++round) {
-    const std::vector<float> sum = row_sums(links, area, centroid);
+    const std::vector<float> sum = row_sums(LinkedFormFactors(links, area, centroid));
     for (std::size_t i = 0; i < sum.size(); ++i) {
       if (!(sum[i] > 0 && target[i] > 0)) continue;
       const float wanted = scaled[i] * std::sqrt(target[i] / sum[i]);

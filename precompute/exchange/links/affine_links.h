@@ -41,12 +41,11 @@ void share(const Ranks& ranks, std::span<std::vector<AffineLink>> lists);
 
 void append_link(const AffineLink& link, FormFactorLinks& links);
 
-/// The link number `l` of `links`.
-AffineLink affine_link(const FormFactorLinks& links, std::size_t l);
+/// A link of the node `to`.
+AffineLink affine_link(std::uint32_t to, const IncomingLink& link);
 
 /// The row sums [n] of F given by links.
-std::vector<float> row_sums(const FormFactorLinks& links, std::span<const float> area,
-                            std::span<const Float3> centroid);
+std::vector<float> row_sums(const LinkedFormFactors& links);
 
 /// Multiplies the scales of `links` until rows nearly add up to `target` [n]; the factors stay in
 /// [0.5, 2]. Where the target is 0 the scale becomes 0: the exchange of such a patch has leaked

@@ -37,21 +37,20 @@ std::vector<std::uint32_t> find_rooms(const ExchangeMatrix& exchange) {
   return numbers_of(sets, n);
 }
 
-/// The same from links.
-std::vector<std::uint32_t> find_rooms(const FormFactorLinks& links) {
-  const std::size_t m = links.first_child.size(), n = links.patch.size();
-  const std::vector<std::uint32_t> begin = first_positions(links);
-  std::vector<std::uint8_t> is_linked(m, 0);
-  for (const auto& [a, b] : links.pair) is_linked[a] = is_linked[b] = 1;
+/// The same from links; `tree` is theirs.
+std::vector<std::uint32_t> find_rooms(const FormFactorLinks& tree, const LinkedFormFactors& links) {
+  const std::size_t m = tree.first_child.size(), n = tree.patch.size();
+  const std::vector<std::uint32_t> begin = first_positions(tree);
   DisjointSets sets(static_cast<std::uint32_t>(n));
-  const auto first_patch = [&](std::uint32_t node) { return links.patch[begin[node]]; };
+  const auto first_patch = [&](std::uint32_t node) { return tree.patch[begin[node]]; };
   for (std::uint32_t node = 0; node < m; ++node) {
-    if (is_linked[node] == 0) continue;
-    for (std::uint32_t k = 1; k < links.count[node]; ++k) {
-      sets.join(first_patch(node), links.patch[begin[node] + k]);
+    const auto of_node = links.incoming(node);
+    if (of_node.empty()) continue;
+    for (std::uint32_t k = 1; k < tree.count[node]; ++k) {
+      sets.join(first_patch(node), tree.patch[begin[node] + k]);
     }
+    for (const IncomingLink& link : of_node) sets.join(first_patch(node), first_patch(link.from));
   }
-  for (const auto& [a, b] : links.pair) sets.join(first_patch(a), first_patch(b));
   return numbers_of(sets, n);
 }
 
@@ -112,12 +111,14 @@ Totals totals_of(const ExchangeMatrix& exchange, const std::vector<float>& area)
 }
 
 /// The same from links; the norm leaves out what patches lose by their scales.
-Totals totals_of(const FormFactorLinks& links, const PatchTable& patches) {
-  const std::vector<NodeSpread> nodes = spread_nodes(links, patches.area, patches.centroid);
-  Totals totals{row_sums(links, patches.area, patches.centroid), 0};
-  for (std::size_t l = 0; l < links.pair.size(); ++l) {
-    const AffineLink link = affine_link(links, l);
-    totals.squared += (link.a == link.b ? 1 : 2) * squared_norm(link, nodes[link.a], nodes[link.b]);
+Totals totals_of(const FormFactorLinks& tree, const LinkedFormFactors& links,
+                 const PatchTable& patches) {
+  const std::vector<NodeSpread> nodes = spread_nodes(tree, patches.area, patches.centroid);
+  Totals totals{row_sums(links), 0};
+  for (std::uint32_t node = 0; node < nodes.size(); ++node) {
+    for (const IncomingLink& link : links.incoming(node)) {
+      totals.squared += squared_norm(affine_link(node, link), nodes[node], nodes[link.from]);
+    }
   }
   return totals;
 }
@@ -186,14 +187,15 @@ FormFactorLinks fit_links(const ExchangeMatrix& exchange, const PatchTable& patc
              patches, error_per_link, progress);
 }
 
-FormFactorLinks fit_links(const FormFactorLinks& links, const PatchTable& patches,
-                          double error_per_link, const Progress& progress) {
+FormFactorLinks fit_links(const FormFactorLinks& tree,
+                          const std::shared_ptr<const LinkedFormFactors>& links,
+                          const PatchTable& patches, double error_per_link,
+                          const Progress& progress) {
   check_error_per_link(error_per_link);
-  check_links(links, patches.size());
+  const LinkedPairs pairs(tree, links, patches);
   // The fit reuses the tree of `links`: in another tree, links would be cut where its nodes end.
-  const SpreadTree tree = spread_tree(tree_of(links), patches, find_rooms(links));
-  return fit(tree, LinkedPairs(links, patches, tree.tree.patch), totals_of(links, patches), patches,
-             error_per_link, progress);
+  const SpreadTree fitted = spread_tree(tree_of(tree), patches, find_rooms(tree, *links));
+  return fit(fitted, pairs, totals_of(tree, *links, patches), patches, error_per_link, progress);
 }
 
 }  // namespace rebounce

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <memory>
+
 #include "precompute/base/progress.h"
 #include "transfer/exchange/exchange_matrix.h"
 #include "transfer/exchange/linked_form_factors.h"
@@ -28,11 +30,13 @@ inline constexpr double kErrorPerLink = 7e-4;
 FormFactorLinks fit_links(const ExchangeMatrix& exchange, const PatchTable& patches,
                           double error_per_link = kErrorPerLink, const Progress& progress = {});
 
-/// Fits links to the pairs that other links stand for. Refinement makes far more links than
-/// necessary: it splits nodes before it knows the result, and splits down to patches where row sums
-/// are doubtful. Nothing with n² entries is stored. Throws Error if `links` are damaged or not of
-/// these patches.
-FormFactorLinks fit_links(const FormFactorLinks& links, const PatchTable& patches,
-                          double error_per_link = kErrorPerLink, const Progress& progress = {});
+/// Fits links to the pairs that other links stand for. `tree` is theirs; its own links are not
+/// read. Refinement makes far more links than necessary: it splits nodes before it knows the
+/// result, and splits down to patches where row sums are doubtful. Nothing with n² entries is
+/// stored. Throws Error if `links` are not of these patches.
+FormFactorLinks fit_links(const FormFactorLinks& tree,
+                          const std::shared_ptr<const LinkedFormFactors>& links,
+                          const PatchTable& patches, double error_per_link = kErrorPerLink,
+                          const Progress& progress = {});
 
 }  // namespace rebounce

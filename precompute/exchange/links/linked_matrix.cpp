@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <tuple>
 #include <utility>
 
@@ -24,23 +23,9 @@ struct Member {
 
 using Range = std::span<const Member>;
 
-float dot(const float* gradient, const Float3& point, const Float3& center) {
+float dot(const Float3& gradient, const Float3& point, const Float3& center) {
   return gradient[0] * (point[0] - center[0]) + gradient[1] * (point[1] - center[1]) +
          gradient[2] * (point[2] - center[2]);
-}
-
-/// The links of each node. A link is listed at both of its nodes.
-Grouped<std::uint64_t> links_of_nodes(const FormFactorLinks& links) {
-  if (links.pair.size() > std::numeric_limits<std::uint32_t>::max()) {
-    throw Error("links: more than 4294967295 cannot be used; ask for fewer patches");
-  }
-  return {links.first_child.size(), [&](const auto& add) {
-            for (std::uint32_t k = 0; k < links.pair.size(); ++k) {
-              const auto [a, b] = links.pair[k];
-              add(a, k);
-              if (a != b) add(b, k);
-            }
-          }};
 }
 
 }  // namespace
@@ -77,7 +62,7 @@ class LinkedMatrix::Filler {
     for (std::uint32_t k = 0; k < patches.size(); ++k) {
       const std::uint32_t p = patches[k];
       result.push_back({matrix_.position_[p], k, table.centroid[p],
-                        matrix_.links_.scale[p] * std::sqrt(table.area[p])});
+                        matrix_.tree_.scale[p] * std::sqrt(table.area[p])});
     }
     std::ranges::sort(result, {}, &Member::position);
     return result;
@@ -96,18 +81,14 @@ class LinkedMatrix::Filler {
 
   void visit(std::uint32_t node, Range near) {
     if (near.empty()) return;
-    // What the links of a node lead to is disjoint.
-    const auto links = matrix_.links_of_node_[node];
-    const auto ends_before = [&](std::uint32_t link) {
-      const Node& to = matrix_.other_end(link, node);
-      return to.begin + to.count <= far_begin_;
-    };
-    for (auto link = std::ranges::partition_point(links, ends_before); link != links.end();
-         ++link) {
-      if (matrix_.other_end(*link, node).begin > far_.back().position) break;
-      follow(*link, node, near);
+    const std::span<const IncomingLink> links = matrix_.links_->incoming(node);
+    for (auto begin = links.begin(); begin != links.end();) {
+      const auto end =
+          std::ranges::upper_bound(begin, links.end(), gradients_of(*begin), {}, gradients_of);
+      follow_some({begin, end}, node, near);
+      begin = end;
     }
-    const std::uint32_t child = matrix_.links_.first_child[node];
+    const std::uint32_t child = matrix_.tree_.first_child[node];
     if (child == kNone) return;
     const std::uint32_t second = matrix_.nodes_[child + 1].begin;
     const auto split = std::ranges::lower_bound(near, second, {}, &Member::position) - near.begin();
@@ -115,19 +96,29 @@ class LinkedMatrix::Filler {
     visit(child + 1, near.subspan(static_cast<std::size_t>(split)));
   }
 
-  void follow(std::uint32_t link, std::uint32_t node, Range near) {
-    const auto& pair = matrix_.links_.pair[link];
-    const bool is_first = pair[0] == node;
-    const Node &from = matrix_.nodes_[node], &to = matrix_.nodes_[is_first ? pair[1] : pair[0]];
+  /// Follows those links of `node` that lead to far patches. What they lead to is disjoint and in
+  /// order.
+  void follow_some(std::span<const IncomingLink> links, std::uint32_t node, Range near) {
+    const auto ends_before = [&](const IncomingLink& link) {
+      const Node& to = matrix_.nodes_[link.from];
+      return to.begin + to.count <= far_begin_;
+    };
+    for (auto link = std::ranges::partition_point(links, ends_before); link != links.end();
+         ++link) {
+      if (matrix_.nodes_[link->from].begin > far_.back().position) break;
+      follow(*link, matrix_.nodes_[node], near);
+    }
+  }
+
+  void follow(const IncomingLink& link, const Node& from, Range near) {
+    const Node& to = matrix_.nodes_[link.from];
     const Range far = far_in(to);
     if (far.empty()) return;
-    const float* const gradient = matrix_.links_.gradient[link].data();
-    const float *near_gradient = gradient, *far_gradient = gradient + 3;
-    if (!is_first) std::swap(near_gradient, far_gradient);
-    const float exchange = matrix_.links_.exchange_area[link];
+    const Float3 near_gradient = to_floats(link.gradient_to),
+                 far_gradient = to_floats(link.gradient_from);
     const auto density = static_cast<float>(1 / (from.area * to.area));
     for (const auto& f : far) {
-      const float at_far = exchange + dot(far_gradient, f.centroid, to.center);
+      const float at_far = link.exchange_area + dot(far_gradient, f.centroid, to.center);
       const float weight = density * f.weight;
       float* const line = entries_ + static_cast<Index>(f.place) * far_stride_;
       for (const auto& n : near) {
@@ -145,44 +136,29 @@ class LinkedMatrix::Filler {
   Index near_stride_, far_stride_;
 };
 
-LinkedMatrix::LinkedMatrix(const FormFactorLinks& links, const PatchTable& patches)
-    : LinkedMatrix(links,
-                   std::make_shared<const LinkedFormFactors>(links, patches.area, patches.centroid),
-                   patches) {}
-
-LinkedMatrix::LinkedMatrix(const FormFactorLinks& links,
-                           std::shared_ptr<const LinkedFormFactors> product,
+LinkedMatrix::LinkedMatrix(const FormFactorLinks& tree,
+                           std::shared_ptr<const LinkedFormFactors> links,
                            const PatchTable& patches)
-    : links_(links),
-      patches_(patches),
-      product_(std::move(product)),
-      position_(patches.size()),
-      links_of_node_(links_of_nodes(links)) {
-  for (std::uint32_t k = 0; k < links.patch.size(); ++k) position_[links.patch[k]] = k;
-  measure_nodes();
-  sort_links();
-}
-
-void LinkedMatrix::sort_links() {
-#pragma omp parallel for schedule(dynamic, 64)
-  for (std::size_t k = 0; k < nodes_.size(); ++k) {
-    const auto node = static_cast<std::uint32_t>(k);
-    std::ranges::sort(links_of_node_[node], {},
-                      [&](std::uint32_t link) { return other_end(link, node).begin; });
+    : tree_(tree), patches_(patches), links_(std::move(links)), position_(patches.size()) {
+  const std::size_t n = patches.size();
+  if (links_->patch_count() != n || tree.patch.size() != n || patches.centroid.size() != n) {
+    throw Error("links: they are for another number of patches");
   }
+  for (std::uint32_t k = 0; k < n; ++k) position_[tree.patch[k]] = k;
+  measure_nodes();
 }
 
 void LinkedMatrix::measure_nodes() {
-  const std::size_t m = links_.first_child.size();
-  const std::vector<std::uint32_t> begin = first_positions(links_);
+  const std::size_t m = tree_.first_child.size();
+  const std::vector<std::uint32_t> begin = first_positions(tree_);
   nodes_.resize(m);
   std::vector<std::array<double, 3>> moment(m);
   for (std::size_t k = m; k-- > 0;) {
     Node& node = nodes_[k];
     node.begin = begin[k];
-    node.count = links_.count[k];
-    const std::uint32_t child = links_.first_child[k];
-    const std::uint32_t patch = links_.patch[node.begin];
+    node.count = tree_.count[k];
+    const std::uint32_t child = tree_.first_child[k];
+    const std::uint32_t patch = tree_.patch[node.begin];
     node.area = child == kNone ? patches_.area[patch] : nodes_[child].area + nodes_[child + 1].area;
     for (int axis = 0; axis < 3; ++axis) {
       moment[k][axis] = child == kNone ? node.area * patches_.centroid[patch][axis]
@@ -215,7 +191,7 @@ void LinkedMatrix::multiply_some(const Eigen::MatrixXf& x, Index begin,
       in[i][c] = x(static_cast<Index>(i), begin + c) / std::sqrt(patches_.area[i]);
     }
   }
-  product_->gather(std::span<const Columns>(in), std::span(out));
+  links_->gather(std::span<const Columns>(in), std::span(out));
 #pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < n; ++i) {
     for (Index c = 0; c < count; ++c) {

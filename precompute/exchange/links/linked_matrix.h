@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "precompute/base/symmetric_matrix.h"
-#include "transfer/base/grouped.h"
 #include "transfer/exchange/linked_form_factors.h"
 #include "transfer/file/transfer_data.h"
 
@@ -17,12 +16,9 @@ namespace rebounce {
 /// link at most.
 class LinkedMatrix final : public SymmetricMatrix {
  public:
-  /// Links and patches must outlive the object. Throws Error if the links are not of these patches.
-  LinkedMatrix(const FormFactorLinks& links, const PatchTable& patches);
-
-  /// `product` is a gathering operator of the same links that the caller shares; null where only
-  /// entries are asked for.
-  LinkedMatrix(const FormFactorLinks& links, std::shared_ptr<const LinkedFormFactors> product,
+  /// `tree` is that of `links`; its own links are not read. It and the patches must outlive the
+  /// object. Throws Error if the links are not of these patches.
+  LinkedMatrix(const FormFactorLinks& tree, std::shared_ptr<const LinkedFormFactors> links,
                const PatchTable& patches);
 
   std::span<const float> area() const override { return patches_.area; }
@@ -40,25 +36,17 @@ class LinkedMatrix final : public SymmetricMatrix {
   class Filler;
 
   void measure_nodes();
-  void sort_links();
-
-  /// The node that a link of `node` leads to.
-  const Node& other_end(std::uint32_t link, std::uint32_t node) const {
-    const auto& [a, b] = links_.pair[link];
-    return nodes_[a == node ? b : a];
-  }
 
   /// Writes the products with `Columns`::size() columns of `x` from `begin` on, or as many as are
   /// left.
   template <typename Columns>
   void multiply_some(const Eigen::MatrixXf& x, Eigen::Index begin, Eigen::MatrixXf& result) const;
 
-  const FormFactorLinks& links_;
+  const FormFactorLinks& tree_;
   const PatchTable& patches_;
-  std::shared_ptr<const LinkedFormFactors> product_;
-  std::vector<std::uint32_t> position_;   ///< [n] position of each patch
-  std::vector<Node> nodes_;               ///< [m]
-  Grouped<std::uint64_t> links_of_node_;  ///< of each node, by where they lead
+  std::shared_ptr<const LinkedFormFactors> links_;
+  std::vector<std::uint32_t> position_;  ///< [n] position of each patch
+  std::vector<Node> nodes_;              ///< [m]
 };
 
 }  // namespace rebounce

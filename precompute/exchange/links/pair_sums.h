@@ -4,7 +4,9 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "precompute/exchange/links/linked_matrix.h"
@@ -57,18 +59,17 @@ class SortedPairs final : public PairSource {
 /// The pairs that links stand for, computed on demand.
 class LinkedPairs final : public PairSource {
  public:
-  /// All arguments must outlive the object; `patch` [n] is the patch at each position, in any
-  /// order.
-  LinkedPairs(const FormFactorLinks& links, const PatchTable& patches,
-              std::span<const std::uint32_t> patch)
-      : matrix_(links, nullptr, patches), patches_(patches), patch_(patch) {}
+  /// `tree` is that of `links`; it and the patches must outlive the object.
+  LinkedPairs(const FormFactorLinks& tree, std::shared_ptr<const LinkedFormFactors> links,
+              const PatchTable& patches)
+      : matrix_(tree, std::move(links), patches), patches_(patches), patch_(tree.patch) {}
 
   void block(PositionRange rows, PositionRange columns, std::span<float> exchange) const override;
 
  private:
   LinkedMatrix matrix_;
   const PatchTable& patches_;
-  std::span<const std::uint32_t> patch_;
+  std::span<const std::uint32_t> patch_;  ///< [n] at each position
 };
 
 /// Sums over the pairs of a block of positions.

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "runtime/rays/float3_glm.h"
 #include "runtime/rays/polygon_form_factor.h"
@@ -310,6 +311,10 @@ PatchGeometry::PatchGeometry(const PatchModel& model, const RayTracer& tracer)
   parts_.resize(n * kPartStride);
   fragments_.resize(n);
   flat_level_.resize(n);
+  std::size_t most_triangles = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    most_triangles = std::max(most_triangles, triangles(i).size());
+  }
 #pragma omp parallel for schedule(dynamic, 64)
   for (std::size_t i = 0; i < n; ++i) {
     for (const FlatTriangle& t : triangles(i)) area_[i] += t.stopping_area();
@@ -317,16 +322,20 @@ PatchGeometry::PatchGeometry(const PatchModel& model, const RayTracer& tracer)
     surface_[i] = PatchSurface(model.mesh, patches[i]);
     outermost_[i] = find_outermost(corner_points(triangles(i)), bounds_[i].centre);
     for (PatchPoint& p : outermost_[i]) p.position = tracer.offset_point(p.position, p.normal);
-    add_parts(i);
+    add_parts(i, triangles(i).size() * most_triangles > kFewNearTrianglePairs);
   }
 }
 
-void PatchGeometry::add_parts(std::size_t patch) {
+void PatchGeometry::add_parts(std::size_t patch, bool with_fragments) {
   const std::span<const FlatTriangle> all = triangles(patch);
   std::vector<FlatTriangle> own(all.begin(), all.end());
-  PartWriter({&parts_[patch * kPartStride], kPartStride}, fragments_[patch].triangle,
-             fragments_[patch].begin)
+  Fragments fragments;
+  PartWriter({&parts_[patch * kPartStride], kPartStride}, fragments.triangle, fragments.begin)
       .write(own, kPartLevels, 0);
+  if (with_fragments) {
+    fragments.triangle.shrink_to_fit();
+    fragments_[patch] = std::move(fragments);
+  }
   int level = 0;
   while (level < kPartLevels && !std::ranges::all_of(parts(patch, level), is_about_flat)) ++level;
   flat_level_[patch] = static_cast<std::uint8_t>(level);

@@ -82,7 +82,8 @@ class PatchGeometry {
   /// flat_level(patch) if the parts replace the patch.
   std::span<const PatchPart> parts(std::size_t patch, int level) const;
 
-  /// The triangles, cut where necessary, of a part of the finest level.
+  /// The triangles, cut where necessary, of a part of the finest level. None for a patch of so few
+  /// triangles that no sum of pairs needs them.
   std::span<const FlatTriangle> fragments(std::size_t patch, std::size_t part) const {
     const std::vector<std::uint32_t>& begin = fragments_[patch].begin;
     return std::span(fragments_[patch].triangle)
@@ -99,7 +100,7 @@ class PatchGeometry {
     std::vector<std::uint32_t> begin;  ///< [parts + 1]
   };
 
-  void add_parts(std::size_t patch);
+  void add_parts(std::size_t patch, bool with_fragments);
 
   std::vector<std::uint32_t> begin_;    ///< [n + 1]
   std::vector<FlatTriangle> triangle_;  ///< those of patch i at [begin_[i], begin_[i + 1])
@@ -108,7 +109,7 @@ class PatchGeometry {
   std::vector<PatchSurface> surface_;   ///< [n]
   float offset_;                        ///< distance of points from the surface, metres
   std::vector<std::array<PatchPoint, 3>> outermost_;  ///< [n]
-  std::vector<Fragments> fragments_;                  ///< [n]
+  std::vector<Fragments> fragments_;                  ///< [n], some of them empty
   std::vector<std::uint8_t> flat_level_;              ///< [n]
   std::vector<PatchPart> parts_;                      ///< [n][all levels, the coarsest first]
 };

@@ -32,9 +32,10 @@ class CorrectedSolverOfRoom : public testing::Test {
         LinkBuilder(model_, test::make_tracer(model_), {}).build(kLinkEpsilon).links;
     links_ = std::make_shared<const LinkedFormFactors>(links, patches().area, patches().centroid);
     const Lights radiosities = lights(48, 1);
-    form_factors_ = compress_form_factors(
-        links, patches(), {std::span(radiosities).first(32), std::span(radiosities).last(16)},
-        {kFormFactorTolerance});
+    form_factors_ =
+        compress_form_factors(links, links_, patches(),
+                              {std::span(radiosities).first(32), std::span(radiosities).last(16)},
+                              {kFormFactorTolerance});
     solved_.emplace(*form_factors_, patches(), kSolveResidual);
   }
 

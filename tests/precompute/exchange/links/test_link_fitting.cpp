@@ -15,6 +15,7 @@
 #include "precompute/exchange/pairs/form_factors.h"
 #include "runtime/rays/float3_glm.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/linked_patches.h"
 #include "tests/support/random_light.h"
 #include "tests/support/test_scenes.h"
 #include "tests/support/with_threads.h"
@@ -60,7 +61,7 @@ std::vector<Float3> gather_pairs(const Pairs& pairs, const std::vector<Float3>& 
 
 std::vector<Float3> gather_links(const Pairs& pairs, const FormFactorLinks& links,
                                  const std::vector<Float3>& in) {
-  return gather(LinkedFormFactors(links, pairs.patches().area, pairs.patches().centroid), in);
+  return gather(*test::gathering(links, pairs.patches()), in);
 }
 
 /// Of F times light that changes from patch to patch, area-weighted L2.
@@ -75,7 +76,7 @@ FormFactorLinks traced(const Pairs& pairs) {
   const PatchTable& patches = pairs.patches();
   const FormFactorLinks links =
       LinkBuilder(pairs.model, test::make_tracer(pairs.model), {}).build(kLinkEpsilon).links;
-  return fit_links(links, patches);
+  return test::fewer_links(links, patches);
 }
 
 TEST(LinkFitting, WorthNextToNothingLinksAreThePairs) {

@@ -12,6 +12,7 @@
 
 #include "precompute/exchange/links/links.h"
 #include "tests/support/expect_error.h"
+#include "tests/support/linked_patches.h"
 #include "tests/support/test_scenes.h"
 
 namespace rebounce::test_link_refitting {
@@ -58,7 +59,7 @@ Walls two_walls(const std::function<double(double, double)>& exchange) {
 
 std::vector<Float3> gathered(const Walls& walls, const FormFactorLinks& links,
                              const std::vector<Float3>& light) {
-  return gather(LinkedFormFactors(links, walls.patches.area, walls.patches.centroid), light);
+  return gather(*test::gathering(links, walls.patches), light);
 }
 
 /// Of the symmetric form, Frobenius.
@@ -88,7 +89,7 @@ double near_kernel(double x, double y) {
 
 TEST(LinkRefitting, AnAffineKernelIsOneLink) {
   const Walls walls = two_walls([](double x, double y) { return 1e-3 * (5 + 0.2 * x - 0.1 * y); });
-  const FormFactorLinks fewer = fit_links(walls.links, walls.patches, 0.1);
+  const FormFactorLinks fewer = test::fewer_links(walls.links, walls.patches, 0.1);
   ASSERT_EQ(fewer.pair.size(), 1U);
   EXPECT_EQ(fewer.count[fewer.pair[0][0]], kSide);
   EXPECT_EQ(fewer.count[fewer.pair[0][1]], kSide);
@@ -100,7 +101,7 @@ TEST(LinkRefitting, WorthMoreLinksAreFewerAndLessTrue) {
   std::size_t count = walls.links.pair.size();
   double error = 1e-3;  // that of bits that gradients have not
   for (const double error_per_link : {0.02, 0.1, 0.3}) {
-    const FormFactorLinks fewer = fit_links(walls.links, walls.patches, error_per_link);
+    const FormFactorLinks fewer = test::fewer_links(walls.links, walls.patches, error_per_link);
     EXPECT_LT(fewer.pair.size(), count);
     EXPECT_GT(fewer.pair.size(), 1U);
     EXPECT_GT(difference(walls, fewer), error);
@@ -113,7 +114,8 @@ TEST(LinkRefitting, WorthMoreLinksAreFewerAndLessTrue) {
 
 TEST(LinkRefitting, WorthNextToNothingTheLightIsTheSame) {
   const Walls walls = two_walls(near_kernel);
-  EXPECT_LE(difference(walls, fit_links(walls.links, walls.patches, 1e-9)), 5e-4 * norm(walls));
+  EXPECT_LE(difference(walls, test::fewer_links(walls.links, walls.patches, 1e-9)),
+            5e-4 * norm(walls));
 }
 
 TEST(LinkRefitting, KeepsWhatPatchesExchangeWithThemselves) {
@@ -124,7 +126,7 @@ TEST(LinkRefitting, KeepsWhatPatchesExchangeWithThemselves) {
   walls.links.gradient.push_back({});
   std::vector<Float3> light(walls.patches.size());
   light[3] = {1, 1, 1};
-  const FormFactorLinks fewer = fit_links(walls.links, walls.patches, 0.02);
+  const FormFactorLinks fewer = test::fewer_links(walls.links, walls.patches, 0.02);
   EXPECT_NEAR(gathered(walls, fewer, light)[3][0], 0.1, 1e-3);
 }
 
@@ -146,11 +148,11 @@ struct TwoRooms {
   }
 
   FormFactorLinks fewer(double error_per_link) const {
-    return fit_links(links, model.patches, error_per_link);
+    return test::fewer_links(links, model.patches, error_per_link);
   }
 
   std::vector<Float3> gathered(const FormFactorLinks& by, const std::vector<Float3>& light) const {
-    return gather(LinkedFormFactors(by, model.patches.area, model.patches.centroid), light);
+    return gather(*test::gathering(by, model.patches), light);
   }
 };
 
@@ -185,10 +187,10 @@ TEST(LinkRefitting, KeepsRowSumsOfRooms) {
 
 TEST(LinkRefitting, RefusesWhatDoesNotFit) {
   Walls walls = two_walls(near_kernel);
-  test::expect_error([&] { fit_links(walls.links, walls.patches, 0); }, "above 0");
+  test::expect_error([&] { test::fewer_links(walls.links, walls.patches, 0); }, "above 0");
   walls.patches.area.pop_back();
   walls.patches.centroid.pop_back();
-  test::expect_error([&] { fit_links(walls.links, walls.patches); }, "patch");
+  test::expect_error([&] { test::fewer_links(walls.links, walls.patches); }, "patch");
 }
 
 }  // namespace

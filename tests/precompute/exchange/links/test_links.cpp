@@ -11,12 +11,12 @@
 #include <functional>
 #include <random>
 
-#include "precompute/exchange/links/link_fitting.h"
 #include "precompute/exchange/links/refined_links.h"
 #include "precompute/exchange/pairs/form_factors.h"
 #include "rebounce/error.h"
 #include "runtime/solvers/gauss_seidel_solver.h"
 #include "runtime/solvers/hierarchical_solver.h"
+#include "tests/support/linked_patches.h"
 #include "tests/support/test_scenes.h"
 #include "tests/support/with_threads.h"
 #include "transfer/base/area_norm.h"
@@ -250,7 +250,7 @@ TEST(Links, PatchesThatSeeNothingExchangeNothing) {
     light.push_back(is_under_the_block(i) ? Float3{1, 1, 1} : Float3{0, 0, 0});
   }
   ASSERT_GT(area_norm(light, model.patches.area), 0);
-  for (const FormFactorLinks& some : {links, fit_links(links, model.patches)}) {
+  for (const FormFactorLinks& some : {links, test::fewer_links(links, model.patches)}) {
     const LinkedFormFactors f(some, model.patches.area, model.patches.centroid);
     EXPECT_EQ(area_norm(gather(f, light), model.patches.area), 0);
     const auto arrived = gather(f, smooth_light(model.patches));
