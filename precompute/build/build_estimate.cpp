@@ -59,11 +59,12 @@ constexpr std::size_t kLinkBytesFound = 95;
 // A patch then, as from pairs.
 constexpr std::size_t kPatchBytesOfLinks = 17'500;
 
-// A link afterwards: what gathers along it; and, while that is made, its flat arrays too.
+// A link afterwards: what gathers along it, twice, where some seven links of ten have no gradients
+// (lab/169); and, while that is made, its flat arrays too.
 constexpr std::size_t kFlatLinkBytes = sizeof(FormFactorLinks{}.pair[0]) +
                                        sizeof(FormFactorLinks{}.exchange_area[0]) +
                                        sizeof(FormFactorLinks{}.gradient[0]);
-constexpr std::size_t kLinkBytesKept = LinkedFormFactors::kBytesPerLink;
+constexpr std::size_t kLinkBytesKept = 25;
 constexpr std::size_t kLinkBytesCopied = kFlatLinkBytes + kLinkBytesKept;
 
 // How many more links there are once those that are too coarse have been made finer, as a part of
@@ -117,10 +118,9 @@ std::uint64_t bytes_beside_transfer(const LinkedBuild& build) {
 
 /// While links become what gathers along them, and then while form factors are compressed.
 std::uint64_t peak_bytes_of_form_factors(const LinkedBuild& build) {
-  return build.held_bytes +
-         std::max(kLinkBytesCopied * build.link_count,
-                  kLinkBytesKept * build.link_count +
-                      form_factor_compression_bytes(build.scene.patch_count));
+  return build.held_bytes + std::max(kLinkBytesCopied * build.link_count,
+                                     kLinkBytesKept * build.link_count +
+                                         form_factor_compression_bytes(build.scene.patch_count));
 }
 
 std::uint64_t bytes_of_libraries(std::size_t patch_count) {

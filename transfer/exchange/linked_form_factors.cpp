@@ -58,6 +58,18 @@ void for_each_incoming(const GiveLinks& give, const Visit& visit) {
   });
 }
 
+/// Sorts lists of links, one after the other, each of which has an `end`, by the first position of
+/// where they lead.
+template <typename Link>
+void sort_lists(std::span<const std::uint64_t> end, std::span<const std::uint32_t> first_position,
+                std::vector<Link>& links) {
+  const auto at = [&](std::uint64_t k) { return links.begin() + static_cast<std::ptrdiff_t>(k); };
+  parallel_for_pieces({}, end.size() - 1, kSortedPerTask, [&](std::size_t k) {
+    std::ranges::sort(at(k == 0 ? 0 : end[k - 1]), at(end[k]), {},
+                      [&](const Link& link) { return first_position[link.from]; });
+  });
+}
+
 /// Checks that the nodes are in order of levels, that siblings are neighbours, and that the
 /// children of a node together have as many patches as the node.
 void check_tree(const FormFactorLinks& links, std::size_t n) {
@@ -132,8 +144,6 @@ std::vector<std::uint32_t> first_positions(const FormFactorLinks& links) {
   return begin;
 }
 
-static_assert(LinkedFormFactors::kBytesPerLink == 2 * sizeof(IncomingLink));
-
 /// The nodes and their links, in the order in which a gather visits them.
 class LinkedFormFactors::Tree {
  public:
@@ -143,9 +153,13 @@ class LinkedFormFactors::Tree {
   std::size_t patch_count() const { return scale_.size(); }
   std::size_t node_count() const { return node_.size(); }
   std::size_t bytes() const;
-  std::span<const IncomingLink> incoming(std::size_t node) const {
-    return std::span(incoming_).subspan(incoming_begin_[node],
-                                        incoming_begin_[node + 1] - incoming_begin_[node]);
+  std::span<const PlainLink> plain_links(std::size_t node) const {
+    return std::span(plain_).subspan(plain_begin_[node],
+                                     plain_begin_[node + 1] - plain_begin_[node]);
+  }
+  std::span<const IncomingLink> affine_links(std::size_t node) const {
+    return std::span(affine_).subspan(affine_begin_[node],
+                                      affine_begin_[node + 1] - affine_begin_[node]);
   }
 
   /// Pulls, gathers and pushes; `light` and `arrived` are workspace [m].
@@ -177,9 +191,11 @@ class LinkedFormFactors::Tree {
 
   std::vector<Node> node_;                  ///< level by level
   std::vector<std::uint32_t> level_begin_;  ///< first node of each level, then the number of nodes
-  std::vector<std::uint64_t> incoming_begin_;  ///< [m + 1]
-  std::vector<IncomingLink> incoming_;  ///< every link twice, sorted by the node that gathers
-  std::vector<float> scale_;            ///< [n]
+  // Every link twice, sorted by the node that gathers.
+  std::vector<std::uint64_t> plain_begin_, affine_begin_;  ///< [m + 1]
+  std::vector<PlainLink> plain_;
+  std::vector<IncomingLink> affine_;
+  std::vector<float> scale_;  ///< [n]
 };
 
 LinkedFormFactors::Tree::Tree(const FormFactorLinks& tree, const GiveLinks& give,
@@ -249,34 +265,39 @@ void LinkedFormFactors::Tree::find_levels() {
 /// sorts the links of a node that have the same gradients by the first position of where they lead.
 void LinkedFormFactors::Tree::sort_links(const GiveLinks& give,
                                          std::span<const std::uint32_t> first_position) {
-  std::vector<std::uint64_t> next(kGradientKinds * node_.size() + 1, 0);
-  const auto place = [](std::uint32_t node, const IncomingLink& link) {
-    return std::size_t{kGradientKinds} * node + gradients_of(link);
+  const std::size_t m = node_.size();
+  std::vector<std::uint64_t> plain(m + 1, 0), affine((kGradientKinds - 1) * m + 1, 0);
+  const auto place = [&](std::uint32_t node, unsigned gradients) -> std::uint64_t* {
+    return gradients == 0 ? &plain[node]
+                          : &affine[(kGradientKinds - 1) * std::size_t{node} + gradients - 1];
   };
   for_each_incoming(give, [&](std::uint32_t node, const IncomingLink& link) {
-    if (node >= node_.size()) refuse("a link joins a node that does not exist");
-    ++next[place(node, link) + 1];
+    if (node >= m) refuse("a link joins a node that does not exist");
+    ++place(node, gradients_of(link))[1];
   });
-  std::partial_sum(next.begin(), next.end(), next.begin());
-  for (std::size_t k = 0; k <= node_.size(); ++k)
-    incoming_begin_.push_back(next[kGradientKinds * k]);
-  incoming_.resize(next.back());
+  std::partial_sum(plain.begin(), plain.end(), plain.begin());
+  std::partial_sum(affine.begin(), affine.end(), affine.begin());
+  plain_begin_ = plain;
+  for (std::size_t k = 0; k <= m; ++k) affine_begin_.push_back(affine[(kGradientKinds - 1) * k]);
+  plain_.resize(plain.back());
+  affine_.resize(affine.back());
   for_each_incoming(give, [&](std::uint32_t node, const IncomingLink& link) {
-    incoming_[next[place(node, link)]++] = link;
+    const unsigned gradients = gradients_of(link);
+    const std::uint64_t next = (*place(node, gradients))++;
+    if (gradients == 0) {
+      plain_[next] = {link.from, link.exchange_area};
+    } else {
+      affine_[next] = link;
+    }
   });
   // Each place has moved to the end of its links.
-  parallel_for_pieces({}, next.size() - 1, kSortedPerTask, [&](std::size_t k) {
-    const auto at = [&](std::size_t end) {
-      return incoming_.begin() + static_cast<std::ptrdiff_t>(end);
-    };
-    std::ranges::sort(at(k == 0 ? 0 : next[k - 1]), at(next[k]), {},
-                      [&](const IncomingLink& link) { return first_position[link.from]; });
-  });
+  sort_lists(plain, first_position, plain_);
+  sort_lists(affine, first_position, affine_);
 }
 
 std::size_t LinkedFormFactors::Tree::bytes() const {
-  return incoming_.size() * sizeof(IncomingLink) + incoming_begin_.size() * sizeof(std::uint64_t) +
-         2 * node_.size() * sizeof(Node);
+  return plain_.size() * sizeof(PlainLink) + affine_.size() * sizeof(IncomingLink) +
+         2 * plain_begin_.size() * sizeof(std::uint64_t) + 2 * node_.size() * sizeof(Node);
 }
 
 template <typename Columns, typename Lanes>
@@ -287,8 +308,9 @@ void LinkedFormFactors::Tree::gather(std::span<const Columns> in, std::span<Colu
   assert(in.size() == patch_count() && out.size() == patch_count());
   pull(in, light, scheduler);
   parallel_for_pieces(scheduler, node_.size(), kGatheredPerTask, [&](std::size_t k) {
-    arrived[k] = gather_node(incoming_.data() + incoming_begin_[k],
-                             incoming_begin_[k + 1] - incoming_begin_[k], light);
+    const auto plain = plain_links(k);
+    const auto affine = affine_links(k);
+    arrived[k] = gather_node({plain.data(), plain.size(), affine.data(), affine.size()}, light);
   });
   push(arrived, out, scheduler);
 }
@@ -367,8 +389,12 @@ std::size_t LinkedFormFactors::bytes() const {
   return tree_->bytes();
 }
 
-std::span<const IncomingLink> LinkedFormFactors::incoming(std::uint32_t node) const {
-  return tree_->incoming(node);
+std::span<const PlainLink> LinkedFormFactors::plain_links(std::uint32_t node) const {
+  return tree_->plain_links(node);
+}
+
+std::span<const IncomingLink> LinkedFormFactors::affine_links(std::uint32_t node) const {
+  return tree_->affine_links(node);
 }
 
 std::size_t LinkedFormFactors::workspace_size() const {

@@ -66,9 +66,6 @@ std::vector<std::uint32_t> first_positions(const FormFactorLinks& links);
 /// symmetric.
 class LinkedFormFactors final : public FormFactorOperator {
  public:
-  /// Bytes per link: each is stored for both of its nodes.
-  static constexpr std::size_t kBytesPerLink = 40;
-
   /// `area` [n] in m², `centroid` [n] in metres. Throws Error if `links` are not a tree over n
   /// patches with links between its nodes.
   LinkedFormFactors(const FormFactorLinks& links, std::span<const float> area,
@@ -84,9 +81,17 @@ class LinkedFormFactors final : public FormFactorOperator {
   std::size_t bytes() const override;
   std::size_t workspace_size() const override;
 
-  /// The links of a node, by the gradients that they have (gradients_of), then by the first
-  /// position of the nodes that they lead to.
-  std::span<const IncomingLink> incoming(std::uint32_t node) const;
+  /// The links of a node without gradients, by the first position of the nodes that they lead to,
+  /// and those with gradients, by these (gradients_of) and then likewise.
+  std::span<const PlainLink> plain_links(std::uint32_t node) const;
+  std::span<const IncomingLink> affine_links(std::uint32_t node) const;
+
+  /// Calls `visit`(link) for each link of a node, as an IncomingLink.
+  template <typename Visit>
+  void for_each_link(std::uint32_t node, const Visit& visit) const {
+    for (const PlainLink& link : plain_links(node)) visit(affine(link));
+    for (const IncomingLink& link : affine_links(node)) visit(link);
+  }
 
   using FormFactorOperator::gather;
 

@@ -5,12 +5,13 @@
 
 #include <immintrin.h>
 
+#include "transfer/kernels/link_gather.h"
 #include "transfer/kernels/link_kernels.h"
 
 namespace rebounce {
 namespace {
 
-LinkLight gather_avx2(const IncomingLink* link, std::size_t count, const LinkLight* light) {
+LinkLight gather_avx2(const LinksOfNode& links, const LinkLight* light) {
   // For each lane, the index of the gradient component that multiplies it; a link has six.
   const __m256i from_x = _mm256_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0);
   const __m256i from_yz = _mm256_setr_epi32(1, 1, 1, 1, 2, 2, 2, 2);
@@ -19,7 +20,8 @@ LinkLight gather_avx2(const IncomingLink* link, std::size_t count, const LinkLig
   constexpr int kFirst = 0x0F;
   __m256 along[2] = {_mm256_setzero_ps(), _mm256_setzero_ps()};
   __m256 across[2] = {_mm256_setzero_ps(), _mm256_setzero_ps()};
-  for (std::size_t l = 0; l < count; ++l) {
+  const IncomingLink* const link = links.affine;
+  for (std::size_t l = 0; l < links.affine_count; ++l) {
     // Both gradients and the two halves of `from`, which no lane uses.
     const __m128i bits = _mm_loadu_si128(reinterpret_cast<const __m128i*>(link + l));
     const __m256 gradient = _mm256_castsi256_ps(_mm256_slli_epi32(_mm256_cvtepu16_epi32(bits), 16));
@@ -36,7 +38,9 @@ LinkLight gather_avx2(const IncomingLink* link, std::size_t count, const LinkLig
     across[1] = _mm256_fmadd_ps(_mm256_permutevar8x32_ps(gradient, to_yz), mean, across[1]);
   }
   const __m256 both = _mm256_add_ps(along[0], along[1]);
-  const __m128 mean = _mm_add_ps(_mm256_castps256_ps128(both), _mm256_extractf128_ps(both, 1));
+  const ColorLanes plain = gather_along_plain_links(links.plain, links.plain_count, light);
+  const __m128 affine = _mm_add_ps(_mm256_castps256_ps128(both), _mm256_extractf128_ps(both, 1));
+  const __m128 mean = _mm_add_ps(_mm_loadu_ps(plain.data()), affine);
   LinkLight sum;
   auto* out = reinterpret_cast<float*>(&sum);
   _mm256_storeu_ps(out, _mm256_insertf128_ps(across[0], mean, 0));

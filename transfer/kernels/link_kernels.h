@@ -21,9 +21,17 @@ struct LinkLightOf {
 using LinkLight = LinkLightOf<ColorLanes>;
 static_assert(sizeof(LinkLight) == 64);
 
-/// Returns what arrives at one node along its `count` links.
+/// The links of a node.
+struct LinksOfNode {
+  const PlainLink* plain;
+  std::size_t plain_count;
+  const IncomingLink* affine;
+  std::size_t affine_count;
+};
+
+/// Returns what arrives at one node along its links.
 template <typename Lanes>
-using GatherAlongLinks = LinkLightOf<Lanes> (*)(const IncomingLink* link, std::size_t count,
+using GatherAlongLinks = LinkLightOf<Lanes> (*)(const LinksOfNode& links,
                                                 const LinkLightOf<Lanes>* light);
 
 // The channels of eight lights.

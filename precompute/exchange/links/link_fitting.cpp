@@ -44,12 +44,13 @@ std::vector<std::uint32_t> find_rooms(const FormFactorLinks& tree, const LinkedF
   DisjointSets sets(static_cast<std::uint32_t>(n));
   const auto first_patch = [&](std::uint32_t node) { return tree.patch[begin[node]]; };
   for (std::uint32_t node = 0; node < m; ++node) {
-    const auto of_node = links.incoming(node);
-    if (of_node.empty()) continue;
+    if (links.plain_links(node).empty() && links.affine_links(node).empty()) continue;
     for (std::uint32_t k = 1; k < tree.count[node]; ++k) {
       sets.join(first_patch(node), tree.patch[begin[node] + k]);
     }
-    for (const IncomingLink& link : of_node) sets.join(first_patch(node), first_patch(link.from));
+    links.for_each_link(node, [&](const IncomingLink& link) {
+      sets.join(first_patch(node), first_patch(link.from));
+    });
   }
   return numbers_of(sets, n);
 }
@@ -116,9 +117,9 @@ Totals totals_of(const FormFactorLinks& tree, const LinkedFormFactors& links,
   const std::vector<NodeSpread> nodes = spread_nodes(tree, patches.area, patches.centroid);
   Totals totals{row_sums(links), 0};
   for (std::uint32_t node = 0; node < nodes.size(); ++node) {
-    for (const IncomingLink& link : links.incoming(node)) {
+    links.for_each_link(node, [&](const IncomingLink& link) {
       totals.squared += squared_norm(affine_link(node, link), nodes[node], nodes[link.from]);
-    }
+    });
   }
   return totals;
 }

@@ -81,11 +81,12 @@ class LinkedMatrix::Filler {
 
   void visit(std::uint32_t node, Range near) {
     if (near.empty()) return;
-    const std::span<const IncomingLink> links = matrix_.links_->incoming(node);
-    for (auto begin = links.begin(); begin != links.end();) {
+    follow_some(matrix_.links_->plain_links(node), node, near);
+    const std::span<const IncomingLink> affine = matrix_.links_->affine_links(node);
+    for (auto begin = affine.begin(); begin != affine.end();) {
       const auto end =
-          std::ranges::upper_bound(begin, links.end(), gradients_of(*begin), {}, gradients_of);
-      follow_some({begin, end}, node, near);
+          std::ranges::upper_bound(begin, affine.end(), gradients_of(*begin), {}, gradients_of);
+      follow_some(std::span<const IncomingLink>{begin, end}, node, near);
       begin = end;
     }
     const std::uint32_t child = matrix_.tree_.first_child[node];
@@ -98,15 +99,16 @@ class LinkedMatrix::Filler {
 
   /// Follows those links of `node` that lead to far patches. What they lead to is disjoint and in
   /// order.
-  void follow_some(std::span<const IncomingLink> links, std::uint32_t node, Range near) {
-    const auto ends_before = [&](const IncomingLink& link) {
+  template <typename Link>
+  void follow_some(std::span<const Link> links, std::uint32_t node, Range near) {
+    const auto ends_before = [&](const Link& link) {
       const Node& to = matrix_.nodes_[link.from];
       return to.begin + to.count <= far_begin_;
     };
     for (auto link = std::ranges::partition_point(links, ends_before); link != links.end();
          ++link) {
       if (matrix_.nodes_[link->from].begin > far_.back().position) break;
-      follow(*link, matrix_.nodes_[node], near);
+      follow(affine(*link), matrix_.nodes_[node], near);
     }
   }
 

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "transfer/base/bfloat16.h"
@@ -55,15 +57,35 @@ std::vector<IncomingLink> random_links(std::size_t count, std::size_t node_count
   return links;
 }
 
+/// Those with gradients, or all without.
+struct RandomLinks {
+  std::vector<IncomingLink> affine;
+  std::vector<PlainLink> plain;
+
+  RandomLinks(std::size_t count, std::size_t node_count, std::mt19937& engine)
+      : affine(random_links(count, node_count, engine)) {
+    for (const IncomingLink& link : random_links(count, node_count, engine)) {
+      plain.push_back({link.from, link.exchange_area});
+    }
+  }
+
+  LinksOfNode first(std::size_t plain_count, std::size_t affine_count) const {
+    return {plain.data(), plain_count, affine.data(), affine_count};
+  }
+};
+
+constexpr std::array<std::pair<std::size_t, std::size_t>, 5> kCounts = {
+    {{0, 0}, {1, 0}, {0, 1}, {7, 200}, {200, 3}}};
+
 TEST(LinkKernels, AgreeWithEachOther) {
   std::mt19937 engine(2);
   const auto light = random_light<ColorLanes>(50, engine);
-  const std::vector<IncomingLink> links = random_links(200, light.size(), engine);
-  for (const std::size_t count : {0UL, 1UL, 200UL}) {
-    const LinkLight wanted = kKernelsPortable.link.gather(links.data(), count, light.data());
+  const RandomLinks links(200, light.size(), engine);
+  for (const auto& [plain, affine] : kCounts) {
+    const LinksOfNode some = links.first(plain, affine);
+    const LinkLight wanted = kKernelsPortable.link.gather(some, light.data());
     for (const KernelSet* set : kernel_sets()) {
-      const auto found =
-          std::bit_cast<std::array<float, 16>>(set->link.gather(links.data(), count, light.data()));
+      const auto found = std::bit_cast<std::array<float, 16>>(set->link.gather(some, light.data()));
       const auto expected = std::bit_cast<std::array<float, 16>>(wanted);
       for (std::size_t k = 0; k < found.size(); ++k) {
         EXPECT_NEAR(found[k], expected[k], 1e-4) << set->instruction_set << " " << k;
@@ -76,20 +98,34 @@ TEST(LinkKernels, GiveTheSameBitsForManyLights) {
   std::mt19937 engine(3);
   const auto floats = random_light<ManyFloats>(50, engine);
   const auto doubles = random_light<ManyDoubles>(50, engine);
-  const std::vector<IncomingLink> links = random_links(200, floats.size(), engine);
-  for (const std::size_t count : {0UL, 1UL, 200UL}) {
-    const auto wanted = kKernelsPortable.link.gather_floats(links.data(), count, floats.data());
-    const auto exact = kKernelsPortable.link.gather_doubles(links.data(), count, doubles.data());
+  const RandomLinks links(200, floats.size(), engine);
+  for (const auto& [plain, affine] : kCounts) {
+    const LinksOfNode some = links.first(plain, affine);
+    const auto wanted = kKernelsPortable.link.gather_floats(some, floats.data());
+    const auto exact = kKernelsPortable.link.gather_doubles(some, doubles.data());
     for (const KernelSet* set : kernel_sets()) {
       SCOPED_TRACE(set->instruction_set);
-      const auto found = set->link.gather_floats(links.data(), count, floats.data());
+      const auto found = set->link.gather_floats(some, floats.data());
       EXPECT_EQ(found.mean, wanted.mean);
       EXPECT_EQ(found.first, wanted.first);
-      const auto found_exact = set->link.gather_doubles(links.data(), count, doubles.data());
+      const auto found_exact = set->link.gather_doubles(some, doubles.data());
       EXPECT_EQ(found_exact.mean, exact.mean);
       EXPECT_EQ(found_exact.first, exact.first);
     }
   }
+}
+
+TEST(LinkKernels, PlainLinksAreLinksWhoseGradientsAreZero) {
+  std::mt19937 engine(4);
+  const auto light = random_light<ManyDoubles>(50, engine);
+  const RandomLinks links(200, light.size(), engine);
+  std::vector<IncomingLink> same;
+  for (const PlainLink& link : links.plain) same.push_back(affine(link));
+  const auto plain = kKernelsPortable.link.gather_doubles(links.first(200, 0), light.data());
+  const auto other =
+      kKernelsPortable.link.gather_doubles({nullptr, 0, same.data(), same.size()}, light.data());
+  EXPECT_EQ(plain.mean, other.mean);
+  EXPECT_EQ(plain.first, other.first);
 }
 
 }  // namespace
