@@ -54,8 +54,8 @@ constexpr std::size_t kBufferBytesOfPatch = 24'000, kBufferBytes = 11'000'000,
 constexpr std::size_t kFactorCopies = 6;
 
 // A link while links are found: the link, and what its rays are counted in or what gathers along it
-// when it is checked (lab/167).
-constexpr std::size_t kLinkBytesFound = 95;
+// when it is checked (lab/169).
+constexpr std::size_t kLinkBytesFound = 82;
 // A patch then, as from pairs.
 constexpr std::size_t kPatchBytesOfLinks = 17'500;
 
@@ -80,8 +80,8 @@ constexpr double kPatchesOfSquare = 2;
 constexpr double kNoRoom = 1e15;
 
 // A patch beside links, with its compressed form factors, up to as many entries as there are pairs
-// (lab/167).
-constexpr std::size_t kPatchBytes = 9000, kPatchBytesOfPair = 4;
+// (lab/169).
+constexpr std::size_t kPatchBytes = 9000, kPatchBytesOfPair = 2;
 
 std::string in_gib(std::uint64_t bytes) {
   return fmt::format("{:.3g} GiB", static_cast<double>(bytes) / (1ULL << 30));

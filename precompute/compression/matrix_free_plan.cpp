@@ -17,9 +17,9 @@ namespace rebounce {
 namespace {
 
 // Bytes per patch, for each matrix, of bases and the rounds of the search, and couplings in rooms,
-// as measured (lab/114, lab/132, lab/156). They hold at the default tolerance and grow with this
+// as measured (lab/114, lab/156, lab/169). They hold at the default tolerance and grow with this
 // power of 1 / tolerance.
-constexpr double kOperatorBytes = 6.7e3, kRoomCouplings = 450, kOperatorGrowth = 0.4;
+constexpr double kOperatorBytes = 6.0e3, kRoomCouplings = 450, kOperatorGrowth = 0.4;
 
 // Bytes of a coupling (pack_couplings), with what more vectors than in rooms take (lab/156).
 constexpr double kCouplingBytes = 1.3;
