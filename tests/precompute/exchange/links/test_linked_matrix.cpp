@@ -11,8 +11,8 @@
 
 #include "precompute/compression/form_factor_compression.h"
 #include "precompute/exchange/links/links.h"
+#include "tests/precompute/exchange/links/linked_patches.h"
 #include "tests/support/expect_error.h"
-#include "tests/support/linked_patches.h"
 #include "tests/support/test_scenes.h"
 #include "transfer/base/area_norm.h"
 

@@ -16,7 +16,7 @@
 #include "rebounce/error.h"
 #include "runtime/solvers/gauss_seidel_solver.h"
 #include "runtime/solvers/hierarchical_solver.h"
-#include "tests/support/linked_patches.h"
+#include "tests/precompute/exchange/links/linked_patches.h"
 #include "tests/support/test_scenes.h"
 #include "tests/support/with_threads.h"
 #include "transfer/base/area_norm.h"
