@@ -188,9 +188,11 @@ TEST(LinkRefitting, KeepsRowSumsOfRooms) {
 TEST(LinkRefitting, RefusesWhatDoesNotFit) {
   Walls walls = two_walls(near_kernel);
   test::expect_error([&] { test::fewer_links(walls.links, walls.patches, 0); }, "above 0");
+  const auto gathering = test::gathering(walls.links, walls.patches);
   walls.patches.area.pop_back();
   walls.patches.centroid.pop_back();
   test::expect_error([&] { test::fewer_links(walls.links, walls.patches); }, "patch");
+  test::expect_error([&] { fit_links(walls.links, gathering, walls.patches); }, "patch");
 }
 
 }  // namespace
