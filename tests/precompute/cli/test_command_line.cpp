@@ -160,9 +160,11 @@ TEST_F(CommandLine, TheShippedScenesAreWhatTheirScriptsMake) {
       "python3 '" + kScenes + "make_cornell_box.py' '" + path("box.gltf") + "'";
   ASSERT_EQ(std::system(command.c_str()), 0);
   EXPECT_EQ(test::read_bytes(path("box.gltf")), test::read_bytes(kScene));
-  ASSERT_EQ(std::system(("python3 '" + kScenes + "make_rooms.py' '" + path(".") + "'").c_str()), 0);
-  for (const std::string name :
-       {"two_rooms", "three_rooms", "furnished_room", "white_room", "pavilion"}) {
+  for (const std::string script : {"make_rooms.py", "make_house.py"}) {
+    ASSERT_EQ(std::system(("python3 '" + kScenes + script + "' '" + path(".") + "'").c_str()), 0);
+  }
+  for (const std::string name : {"two_rooms", "three_rooms", "furnished_room", "furnished_house",
+                                 "white_room", "pavilion"}) {
     const std::string file = name + ".gltf";
     EXPECT_EQ(test::read_bytes(path(file)), test::read_bytes(kScenes + file)) << name;
   }
