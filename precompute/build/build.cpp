@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <set>
 #include <string_view>
+#include <utility>
 
 #include "precompute/base/thread_limit.h"
 #include "precompute/build/build_decisions.h"
@@ -117,12 +119,11 @@ class TransferBuild {
   void find_exchange() {
     const bool links = decided_.exchange_source == ExchangeSource::kLinks;
     const bool operator_of_links = links && decided_.operator_kind != OperatorKind::kNoOperator;
-    EscapedLight escaped = links ? find_links(model_, tracer(), roles_, judges_links(), decided_,
-                                              data_, report_, clock_)
-                                 : find_pairs(model_, tracer(), decided_, data_, report_, clock_);
+    EscapedLight escaped =
+        links ? find_linked() : find_pairs(model_, tracer(), decided_, data_, report_, clock_);
     if (operator_of_links) {
       LinkedBuild build =
-          linked_build(built_scene(model_, decided_), report_.link_count,
+          linked_build(built_scene(model_, decided_), report_.link_count, links_->bytes(),
                        model_.patches.reflectance, roles_, kCompressionPart * decided_.tolerance);
       std::uint64_t& limit = decided_.memory_limit_bytes;
       announce(report_.estimate_after_links.emplace(estimate_after_links(build, limit)));
@@ -142,8 +143,8 @@ class TransferBuild {
     if (decided_.operator_kind == OperatorKind::kNoOperator) return;
     const bool links = decided_.exchange_source == ExchangeSource::kLinks;
     const std::vector<KindError> errors =
-        links ? make_operator_from_links(*tracer_, model_.shown_patch, decided_, roles_, data_,
-                                         report_, clock_)
+        links ? make_operator_from_links(std::move(links_), *tracer_, model_.shown_patch, decided_,
+                                         roles_, data_, report_, clock_)
               : make_operator_from_pairs(*tracer_, decided_, roles_, data_, report_, clock_);
     make_outputs_of_operator(model_.shown_patch, *tracer_, decided_, data_, report_, clock_);
     record_build(decided_, report_, errors, data_);
@@ -166,6 +167,17 @@ class TransferBuild {
     return decided_.exchange_source == ExchangeSource::kLinks &&
            decided_.operator_kind != OperatorKind::kNoOperator &&
            settings_.form_factors.link_epsilon == 0;
+  }
+
+  /// Finds links: for an operator, or else into the data.
+  EscapedLight find_linked() {
+    LinkBuild build =
+        find_links(model_, tracer(), roles_, judges_links(), decided_, data_, report_, clock_);
+    links_ = std::move(build.form_factors);
+    if (decided_.operator_kind == OperatorKind::kNoOperator) {
+      data_.links = flat_links(*std::exchange(links_, nullptr));
+    }
+    return std::move(build);
   }
 
   /// Of the surfaces of the model, made once.
@@ -208,6 +220,7 @@ class TransferBuild {
   PatchModel model_;
   PatchSelection receivers_, sources_;
   PatchRoles roles_;
+  std::shared_ptr<const LinkedFormFactors> links_;
   std::optional<RayTracer> tracer_;
   std::optional<ThreadLimit> thread_limit_;  ///< of what follows links
 };

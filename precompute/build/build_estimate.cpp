@@ -12,7 +12,6 @@
 #include "precompute/exchange/pairs/form_factors.h"
 #include "runtime/rays/triangle.h"
 #include "transfer/base/machine_memory.h"
-#include "transfer/exchange/linked_form_factors.h"
 
 namespace rebounce {
 namespace {
@@ -54,18 +53,14 @@ constexpr std::size_t kBufferBytesOfPatch = 24'000, kBufferBytes = 11'000'000,
 constexpr std::size_t kFactorCopies = 6;
 
 // A link while links are found: the link, and what its rays are counted in or what gathers along it
-// when it is checked (lab/169).
-constexpr std::size_t kLinkBytesFound = 82;
-// A patch then, as from pairs.
-constexpr std::size_t kPatchBytesOfLinks = 17'500;
+// when it is checked (lab/171).
+constexpr std::size_t kLinkBytesFound = 60;
+// A patch then: its parts, what its hemisphere rays meet, the lights of the check (lab/171).
+constexpr std::size_t kPatchBytesOfLinks = 11'500;
 
 // A link afterwards: what gathers along it, twice, where some seven links of ten have no gradients
-// (lab/169); and, while that is made, its flat arrays too.
-constexpr std::size_t kFlatLinkBytes = sizeof(FormFactorLinks{}.pair[0]) +
-                                       sizeof(FormFactorLinks{}.exchange_area[0]) +
-                                       sizeof(FormFactorLinks{}.gradient[0]);
+// (lab/169).
 constexpr std::size_t kLinkBytesKept = 25;
-constexpr std::size_t kLinkBytesCopied = kFlatLinkBytes + kLinkBytesKept;
 
 // How many more links there are once those that are too coarse have been made finer, as a part of
 // those that are forecast: between none and 1.4 times, by the scene. What is said lies in between
@@ -116,11 +111,9 @@ std::uint64_t bytes_beside_transfer(const LinkedBuild& build) {
          kLinkBytesKept * build.link_count;
 }
 
-/// While links become what gathers along them, and then while form factors are compressed.
 std::uint64_t peak_bytes_of_form_factors(const LinkedBuild& build) {
-  return build.held_bytes + std::max(kLinkBytesCopied * build.link_count,
-                                     kLinkBytesKept * build.link_count +
-                                         form_factor_compression_bytes(build.scene.patch_count));
+  return build.held_bytes + kLinkBytesKept * build.link_count +
+         form_factor_compression_bytes(build.scene.patch_count);
 }
 
 std::uint64_t bytes_of_libraries(std::size_t patch_count) {
@@ -172,11 +165,11 @@ BuiltScene built_scene(const PatchModel& model, const BuildSettings& decided) {
   return scene;
 }
 
-LinkedBuild linked_build(const BuiltScene& scene, std::size_t link_count,
+LinkedBuild linked_build(const BuiltScene& scene, std::size_t link_count, std::uint64_t link_bytes,
                          std::span<const Float3> reflectance, const PatchRoles& roles,
                          double tolerance) {
-  const std::uint64_t held = resident_memory_bytes(), links = kFlatLinkBytes * link_count;
-  return {scene,      held > links ? held - links : 0,
+  const std::uint64_t held = resident_memory_bytes();
+  return {scene,      held - std::min(held, link_bytes),
           link_count, distinct_channels(reflectance),
           roles,      tolerance};
 }

@@ -50,8 +50,8 @@ struct LinkedBuild {
   double tolerance = kDefaultTolerance;  ///< of the operator
 };
 
-/// Of a model whose links are known and in memory.
-LinkedBuild linked_build(const BuiltScene& scene, std::size_t link_count,
+/// Of a model of which links take `link_bytes` of the memory at present.
+LinkedBuild linked_build(const BuiltScene& scene, std::size_t link_count, std::uint64_t link_bytes,
                          std::span<const Float3> reflectance, const PatchRoles& roles,
                          double tolerance);
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "precompute/build/phase_clock.h"
+#include "precompute/exchange/links/links.h"
 #include "precompute/exchange/pairs/exchange_results.h"
 #include "precompute/patches/patch_model.h"
 #include "rebounce/build_report.h"
@@ -18,18 +19,18 @@ EscapedLight find_pairs(const PatchModel& model, const RayTracer& tracer,
                         const BuildSettings& decided, TransferData& data, BuildReport& report,
                         PhaseClock& clock);
 
-/// Finds what patches exchange as links, into data.links, and records it in `report`. `decided`:
-/// settings that leave nothing open.
+/// Finds what patches exchange as links, and records it in `report`. `decided`: settings that leave
+/// nothing open.
 ///
 /// With `judged`, rays tell what the light of the links is off by under some point lights
 /// (error_of_links). Above the part of the tolerance that links may take, they are made again with
 /// a smaller link_epsilon, which goes to `decided`, at most twice and only as far as the memory
 /// limit allows and it helps. The patches and the mesh of `model` are lent to `data` meanwhile.
 ///
-/// Returns what leaves the scene. Throws Cancelled if asked to stop.
-EscapedLight find_links(PatchModel& model, const RayTracer& tracer, const PatchRoles& roles,
-                        bool judged, BuildSettings& decided, TransferData& data,
-                        BuildReport& report, PhaseClock& clock);
+/// Throws Cancelled if asked to stop.
+LinkBuild find_links(PatchModel& model, const RayTracer& tracer, const PatchRoles& roles,
+                     bool judged, BuildSettings& decided, TransferData& data, BuildReport& report,
+                     PhaseClock& clock);
 
 /// Forecasts the number of links, from a sample. Throws Cancelled if asked to stop.
 std::size_t forecast_links(const PatchModel& model, const RayTracer& tracer,

@@ -24,13 +24,12 @@ struct Numbers {
 };
 static_assert(std::is_trivially_copyable_v<Numbers>);
 
-/// References to all arrays of a LinkBuild, which may be const.
-template <typename Build>
-auto arrays_of(Build& build) {
-  auto& links = build.links;
-  auto& sky = build.sky_cells;
+/// References to all arrays, which may be const.
+template <typename Links, typename Escaped>
+auto arrays_of(Links& links, Escaped& escaped) {
+  auto& sky = escaped.sky_cells;
   return std::tie(links.patch, links.first_child, links.count, links.pair, links.exchange_area,
-                  links.gradient, links.scale, build.sky_visibility, build.absorbed,
+                  links.gradient, links.scale, escaped.sky_visibility, escaped.absorbed,
                   sky.entry_begin, sky.entry_cell, sky.entry_part);
 }
 
@@ -53,21 +52,24 @@ std::string identity_of_links(const PatchModel& model, const PatchRoles& roles, 
 }
 
 void keep_links(const Checkpoint& checkpoint, const JudgedLinks& links) {
+  if (!checkpoint.keeps()) return;
   const LinkBuild& build = links.build;
+  const FormFactorLinks flat = flat_links(*build.form_factors);
   const std::vector<Numbers> numbers = {
       {links.epsilon, links.limits, build.closure, build.ray_count, build.candidate_count}};
   std::apply([&](const auto&... arrays) { checkpoint.keep(kName, numbers, arrays...); },
-             arrays_of(build));
+             arrays_of(flat, build));
 }
 
-bool find_kept_links(const Checkpoint& checkpoint, std::uint64_t memory_limit_bytes,
-                     JudgedLinks& links) {
+bool find_kept_links(const Checkpoint& checkpoint, const PatchTable& patches,
+                     std::uint64_t memory_limit_bytes, JudgedLinks& links) {
   Ranks().share(std::span(&memory_limit_bytes, 1));  // item 0 is that of rank 0
   std::vector<Numbers> numbers;
   LinkBuild& build = links.build;
+  FormFactorLinks flat;
   const bool found =
       std::apply([&](auto&... arrays) { return checkpoint.find(kName, numbers, arrays...); },
-                 arrays_of(build));
+                 arrays_of(flat, build));
   if (!found || memory_limit_bytes < numbers.at(0).limits.least ||
       memory_limit_bytes >= numbers[0].limits.end) {
     links = {};
@@ -75,6 +77,9 @@ bool find_kept_links(const Checkpoint& checkpoint, std::uint64_t memory_limit_by
   }
   links.epsilon = numbers[0].epsilon;
   links.limits = numbers[0].limits;
+  build.form_factors =
+      std::make_shared<const LinkedFormFactors>(flat, patches.area, patches.centroid);
+  build.link_count = flat.pair.size();
   build.closure = numbers[0].closure;
   build.ray_count = numbers[0].ray_count;
   build.candidate_count = numbers[0].candidate_count;

@@ -32,9 +32,10 @@ std::string identity_of_links(const PatchModel& model, const PatchRoles& roles, 
 /// Keeps links, and what was found with them. Throws Error if they cannot be written.
 void keep_links(const Checkpoint& checkpoint, const JudgedLinks& links);
 
-/// Reads what keep_links has kept. Returns false, and leaves `links` empty, if it is not there, or
-/// if rank 0's `memory_limit_bytes` would lead to other links. All ranks call it.
-bool find_kept_links(const Checkpoint& checkpoint, std::uint64_t memory_limit_bytes,
-                     JudgedLinks& links);
+/// Reads what keep_links has kept for these `patches`. Returns false, and leaves `links` empty, if
+/// it is not there, or if rank 0's `memory_limit_bytes` would lead to other links. All ranks call
+/// it.
+bool find_kept_links(const Checkpoint& checkpoint, const PatchTable& patches,
+                     std::uint64_t memory_limit_bytes, JudgedLinks& links);
 
 }  // namespace rebounce

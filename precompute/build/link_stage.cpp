@@ -60,17 +60,16 @@ double finer_epsilon(double epsilon, double error, double tolerance) {
   return epsilon * std::clamp(wanted, kLeastStep, kMostStep);
 }
 
-/// The memory that as many links as epsilon times `step` gives need, where `builder` has found
-/// `link_count`.
+/// The memory that as many links as epsilon times `step` gives need, where `builder` has `found`
+/// some.
 std::uint64_t bytes_of_finer(const PatchModel& model, const PatchRoles& roles,
                              const BuildSettings& decided, const LinkBuilder& builder,
-                             std::size_t link_count, double step) {
-  const double finer = static_cast<double>(link_count) * std::pow(step, -kCountPower);
-  LinkedBuild build =
-      linked_build(built_scene(model.patches.size(), model.mesh), /*link_count=*/0,
-                   model.patches.reflectance, roles, kCompressionPart * decided.tolerance);
-  build.link_count = static_cast<std::size_t>(finer);
-  build.held_bytes -= std::min(build.held_bytes, builder.held_bytes());
+                             const LinkBuild& found, double step) {
+  const double finer = static_cast<double>(found.link_count) * std::pow(step, -kCountPower);
+  const LinkedBuild build =
+      linked_build(built_scene(model.patches.size(), model.mesh), static_cast<std::size_t>(finer),
+                   builder.held_bytes() + found.form_factors->bytes(), model.patches.reflectance,
+                   roles, kCompressionPart * decided.tolerance);
   return std::max(peak_bytes_of_links(build),
                   peak_bytes_after_links(build, decided.memory_limit_bytes));
 }
@@ -93,14 +92,12 @@ JudgedLinks near_enough_links(PatchModel& model, const RayTracer& tracer, const 
   LinkBuilder builder(model, tracer, decided.form_factors);
   double last_error = 0;
   for (int round = 1;; ++round) {
-    const std::size_t link_count =
-        clock.run(round == 1 ? "form factors" : "finer links",
-                  [&](const Progress& part) { return builder.find(epsilon, part); });
-    if (!judged || round == kMostRounds) return {builder.result(), epsilon, limits};
+    LinkBuild found = clock.run(round == 1 ? "form factors" : "finer links",
+                                [&](const Progress& part) { return builder.build(epsilon, part); });
+    if (!judged || round == kMostRounds) return {std::move(found), epsilon, limits};
     const double error = clock.run("check of links", [&](const Progress& part) {
-      const auto links = builder.form_factors();
-      const LentPatches lent(model, builder.escaped(), data);
-      return error_of_links(links, data, model.shown_patch, tracer, roles,
+      const LentPatches lent(model, found, data);
+      return error_of_links(found.form_factors, data, model.shown_patch, tracer, roles,
                             decided.form_factors.seed, part)
           .mean;
     });
@@ -108,10 +105,10 @@ JudgedLinks near_enough_links(PatchModel& model, const RayTracer& tracer, const 
     const bool is_last = error <= kAccepted * decided.tolerance || !helps;
     const double finer = finer_epsilon(epsilon, error, decided.tolerance);
     const auto bytes_needed = [&] {
-      return bytes_of_finer(model, roles, decided, builder, link_count, finer / epsilon);
+      return bytes_of_finer(model, roles, decided, builder, found, finer / epsilon);
     };
     if (is_last || !finer_fit(bytes_needed(), decided.memory_limit_bytes, limits)) {
-      return {builder.result(), epsilon, limits};
+      return {std::move(found), epsilon, limits};
     }
     epsilon = finer;
     last_error = error;
@@ -120,24 +117,23 @@ JudgedLinks near_enough_links(PatchModel& model, const RayTracer& tracer, const 
 
 }  // namespace
 
-EscapedLight find_links(PatchModel& model, const RayTracer& tracer, const PatchRoles& roles,
-                        bool judged, BuildSettings& decided, TransferData& data,
-                        BuildReport& report, PhaseClock& clock) {
+LinkBuild find_links(PatchModel& model, const RayTracer& tracer, const PatchRoles& roles,
+                     bool judged, BuildSettings& decided, TransferData& data, BuildReport& report,
+                     PhaseClock& clock) {
   const Checkpoint checkpoint(decided.checkpoint, identity_of_links(model, roles, judged, decided));
   JudgedLinks links;
-  if (!find_kept_links(checkpoint, decided.memory_limit_bytes, links)) {
+  if (!find_kept_links(checkpoint, model.patches, decided.memory_limit_bytes, links)) {
     links = near_enough_links(model, tracer, roles, judged, decided, data, clock);
     return_freed_memory();  // of what finer links would have been made from
     if (Ranks().rank() == 0) keep_links(checkpoint, links);
   }
   decided.form_factors.link_epsilon = links.epsilon;
-  LinkBuild& build = links.build;
+  const LinkBuild& build = links.build;
   report.ray_count = build.ray_count;
   report.pair_count = build.candidate_count;
-  report.link_count = build.links.pair.size();
+  report.link_count = build.link_count;
   report.closure = build.closure;
-  data.links = std::move(build.links);
-  return std::move(build);
+  return std::move(links.build);
 }
 
 std::size_t forecast_links(const PatchModel& model, const RayTracer& tracer,

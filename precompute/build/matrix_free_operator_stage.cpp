@@ -105,9 +105,12 @@ double form_factor_tolerance(const BuildSettings& decided, const FittedLights& l
 /// What the stages of an operator from links share.
 class LinkedOperator {
  public:
-  LinkedOperator(const RayTracer& tracer, const BuildSettings& decided, const PatchRoles& roles,
-                 TransferData& data, BuildReport& report, PhaseClock& clock)
-      : tracer_(tracer),
+  LinkedOperator(std::shared_ptr<const LinkedFormFactors> links, const RayTracer& tracer,
+                 const BuildSettings& decided, const PatchRoles& roles, TransferData& data,
+                 BuildReport& report, PhaseClock& clock)
+      : links_(std::move(links)),
+        link_count_(report.link_count),
+        tracer_(tracer),
         decided_(decided),
         roles_(roles),
         data_(data),
@@ -115,7 +118,9 @@ class LinkedOperator {
         clock_(clock) {}
 
   std::vector<KindError> make(std::span<const std::uint32_t> shown_patch) {
-    FormFactorLinks fewer = fewer_links();
+    FormFactorLinks fewer = clock_.run("fewer links", [&](const Progress& part) {
+      return fit_links(links_, data_.patches, kErrorPerLink, part);
+    });
     find_fitting_lights(fewer);
     if (!decided_.store_links) fewer = {};
     compress_form_factors_of();
@@ -137,18 +142,6 @@ class LinkedOperator {
  private:
   double tolerance() const { return kCompressionPart * decided_.tolerance; }
 
-  /// Takes the links of the data into `links_`; their tree stays. Returns those that are enough for
-  /// fitting.
-  FormFactorLinks fewer_links() {
-    link_count_ = data_.links.pair.size();
-    return clock_.run("fewer links", [&](const Progress& part) {
-      links_ = std::make_shared<const LinkedFormFactors>(data_.links, data_.patches.area,
-                                                         data_.patches.centroid);
-      data_.links.drop_links();
-      return fit_links(data_.links, links_, data_.patches, kErrorPerLink, part);
-    });
-  }
-
   void find_fitting_lights(const FormFactorLinks& fewer) {
     lights_ = clock_.run("fitting lights", [&](const Progress& part) {
       // The third digit of the radiosities does not matter here.
@@ -164,8 +157,7 @@ class LinkedOperator {
   void compress_form_factors_of() {
     data_.compressed_form_factors =
         clock_.run("form factor compression", [&](const Progress& part) {
-          return compress_form_factors(data_.links, links_, data_.patches,
-                                       lights_.radiosities.view(),
+          return compress_form_factors(links_, data_.patches, lights_.radiosities.view(),
                                        {report_.form_factor_tolerance, Precision::kF16}, part);
         });
     report_.form_factor_error = form_factor_error(*data_.compressed_form_factors, *links_,
@@ -227,14 +219,14 @@ class LinkedOperator {
     check(seed_of_second_check(decided_.form_factors.seed));
   }
 
+  const std::shared_ptr<const LinkedFormFactors> links_;
+  const std::size_t link_count_;
   const RayTracer& tracer_;
   const BuildSettings& decided_;
   const PatchRoles& roles_;
   TransferData& data_;
   BuildReport& report_;
   PhaseClock& clock_;
-  std::size_t link_count_ = 0;
-  std::shared_ptr<const LinkedFormFactors> links_;
   FittedLights lights_;
   std::optional<MatrixFreeTransfer> solved_;
   std::optional<CorrectedSolver> solver_;  ///< that the last check has used
@@ -244,12 +236,14 @@ class LinkedOperator {
 
 }  // namespace
 
-std::vector<KindError> make_operator_from_links(const RayTracer& tracer,
+std::vector<KindError> make_operator_from_links(std::shared_ptr<const LinkedFormFactors> links,
+                                                const RayTracer& tracer,
                                                 std::span<const std::uint32_t> shown_patch,
                                                 const BuildSettings& decided,
                                                 const PatchRoles& roles, TransferData& data,
                                                 BuildReport& report, PhaseClock& clock) {
-  return LinkedOperator(tracer, decided, roles, data, report, clock).make(shown_patch);
+  return LinkedOperator(std::move(links), tracer, decided, roles, data, report, clock)
+      .make(shown_patch);
 }
 
 }  // namespace rebounce

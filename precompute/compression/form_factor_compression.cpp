@@ -28,10 +28,10 @@ std::shared_ptr<const HierarchicalOperator> compress_form_factors(
 }
 
 std::shared_ptr<const HierarchicalOperator> compress_form_factors(
-    const FormFactorLinks& tree, std::shared_ptr<const LinkedFormFactors> links,
-    const PatchTable& patches, const FittingLights& radiosities,
-    const HierarchicalSettings& settings, const Progress& progress) {
-  return compress_to_tolerance(LinkedMatrix(tree, std::move(links), patches), patches,
+    std::shared_ptr<const LinkedFormFactors> links, const PatchTable& patches,
+    const FittingLights& radiosities, const HierarchicalSettings& settings,
+    const Progress& progress) {
+  return compress_to_tolerance(LinkedMatrix(std::move(links), patches), patches,
                                copies_of(radiosities), without_cluster_bases(settings), progress);
 }
 

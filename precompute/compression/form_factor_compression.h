@@ -23,13 +23,12 @@ std::shared_ptr<const HierarchicalOperator> compress_form_factors(
     const ExchangeMatrix& exchange, const PatchTable& patches, const FittingLights& radiosities,
     const HierarchicalSettings& settings, const Progress& progress = {});
 
-/// The same from links, without storing the pairs that they stand for. `tree` is that of `links`;
-/// its own links are not read. Each multiplier that is tried reads every entry once; the memory is
-/// that of a few pieces of the matrix.
+/// The same from links, without storing the pairs that they stand for. Each multiplier that is
+/// tried reads every entry once; the memory is that of a few pieces of the matrix.
 std::shared_ptr<const HierarchicalOperator> compress_form_factors(
-    const FormFactorLinks& tree, std::shared_ptr<const LinkedFormFactors> links,
-    const PatchTable& patches, const FittingLights& radiosities,
-    const HierarchicalSettings& settings, const Progress& progress = {});
+    std::shared_ptr<const LinkedFormFactors> links, const PatchTable& patches,
+    const FittingLights& radiosities, const HierarchicalSettings& settings,
+    const Progress& progress = {});
 
 /// Errors of the `compressed` form factors against `exact` ones, for these radiosities B.
 FormFactorError form_factor_error(const HierarchicalOperator& compressed,

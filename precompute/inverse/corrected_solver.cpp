@@ -55,7 +55,7 @@ Lights CorrectedSolver::gather(const Lights& radiosities) const {
   const std::size_t n = patches_.size();
   const Ranks ranks;
   Lights gathered(radiosities.size());
-  std::vector<Columns> from(n), to(n);
+  std::vector<Columns> from(n), to(n), workspace;
   for (std::size_t begin = 0; begin < radiosities.size(); begin += kGathered) {
     if (!ranks.makes(begin, kGathered)) continue;
     const std::size_t count = std::min(kGathered, radiosities.size() - begin);
@@ -65,7 +65,7 @@ Lights CorrectedSolver::gather(const Lights& radiosities) const {
         std::ranges::copy(radiosities[begin + k][i], from[i].begin() + k * kChannelCount);
       }
     }
-    links_->gather(std::span<const Columns>(from), std::span(to));
+    links_->gather(std::span<const Columns>(from), std::span(to), workspace);
     for (std::size_t k = 0; k < count; ++k) {
       std::vector<Float3>& light = gathered[begin + k];
       light.resize(n);

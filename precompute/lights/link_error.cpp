@@ -1,5 +1,6 @@
 #include "precompute/lights/link_error.h"
 
+#include <utility>
 #include <vector>
 
 #include "precompute/lights/random_lights.h"
@@ -26,16 +27,17 @@ SampledError error_of_links(const std::shared_ptr<const LinkedFormFactors>& link
   // Other rays than those of the statement that is made of the operator, which chance would favour.
   WholeErrorEstimator estimator(data, roles, mix_bits(seed),
                                 WholeErrorEstimator::sample_for(data.patches.size(), kJudgingRays));
-  const std::vector<std::vector<Float3>> lights = random_initial_exitances(
+  std::vector<std::vector<Float3>> lights = random_initial_exitances(
       data, tracer, LightKind::kPoint, kJudgingLights, mix_bits(seed + kJudgingLights), roles);
-  const auto truths = solve_batches(lights, {}, [&](std::span<const std::vector<Float3>> some) {
+  auto truths = solve_batches(lights, {}, [&](std::span<const std::vector<Float3>> some) {
     return solver.indirect_irradiances(some, kLeastResidual, kJudgingResidual);
   });
   for (std::size_t k = 0; k < lights.size(); ++k) {
-    if (arrives_nowhere(truths[k], lights[k], data.patches.area)) continue;
-    std::vector<Float3> received = truths[k];
+    const std::vector<Float3> light = std::move(lights[k]), truth = std::move(truths[k]);
+    if (arrives_nowhere(truth, light, data.patches.area)) continue;
+    std::vector<Float3> received = truth;
     roles.keep(PatchRoles::kReceiver, received);
-    estimator.add(lights[k], truths[k], received);
+    estimator.add(light, truth, received);
   }
   const auto transfer = [&](std::span<const std::vector<Float3>> light) {
     return solve_batches(light, {}, [&](std::span<const std::vector<Float3>> some) {

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 #include "precompute/base/arithmetic.h"
@@ -44,20 +45,24 @@ Field<kRows> times(const FormFactorRows& rows, const Field<kRows>& in) {
   return out;
 }
 
+/// Gathers along links in the arithmetic of `Scalar`, with memory that is used again.
 template <typename Scalar, int kRows>
-Field<kRows> gather_along(const LinkedFormFactors& links, const Field<kRows>& in) {
-  using Columns = std::array<Scalar, kRows>;
-  using ScalarField = Eigen::Array<Scalar, kRows, Eigen::Dynamic>;
-  std::vector<Columns> from(in.cols()), to(in.cols());
-  Eigen::Map<ScalarField>(from.front().data(), kRows, in.cols()) = in.template cast<Scalar>();
-  links.gather(std::span<const Columns>(from), std::span(to));
-  return Eigen::Map<const ScalarField>(to.front().data(), kRows, in.cols()).template cast<double>();
-}
+class LinkGatherer {
+ public:
+  void gather(const LinkedFormFactors& links, const Field<kRows>& in, Field<kRows>& out) {
+    from_.resize(in.cols());
+    to_.resize(in.cols());
+    Map(from_.front().data(), kRows, in.cols()) = in.template cast<Scalar>();
+    links.gather(std::span<const Columns>(from_), std::span(to_), workspace_);
+    out = Map(to_.front().data(), kRows, in.cols()).template cast<double>();
+  }
 
-template <int kRows>
-Field<kRows> times(const std::shared_ptr<const LinkedFormFactors>& links, const Field<kRows>& in) {
-  return gather_along<double>(*links, in);
-}
+ private:
+  using Columns = std::array<Scalar, kRows>;
+  using Map = Eigen::Map<Eigen::Array<Scalar, kRows, Eigen::Dynamic>>;
+
+  std::vector<Columns> from_, to_, workspace_;
+};
 
 /// One light after the other, in single precision.
 template <int kRows>
@@ -119,7 +124,7 @@ class ConjugateGradients {
     }
   }
 
-  Solution solve(const Residual& residual) const {
+  Solution solve(const Residual& residual) {
     const Totals of_initial =
         residual.of_initial_exitance * residual.of_initial_exitance * per_light(product(m0_, m0_));
     Field z = Field::Zero(kRows, m0_.cols());
@@ -127,13 +132,16 @@ class ConjugateGradients {
     for (int steps = 0, round = 0; steps < kMaxSteps; ++round) {
       const Arithmetic arithmetic =
           coarse && round < kSingleRounds ? Arithmetic::kSingle : Arithmetic::kDouble;
-      Field b = m0_ + root_ * z, h = gather(b, arithmetic);
-      const Field reflected = root_ * h;
-      const Field r = reflected - z;  // R r is the residual of B
-      const Totals allowed = of_initial.max(
-          residual.of_reflected_light * residual.of_reflected_light * exitance_squares(reflected));
+      Field b = m0_ + root_ * z, h;
+      gather(b, arithmetic, h);
+      Field r = root_ * h;
+      const Totals allowed = of_initial.max(residual.of_reflected_light *
+                                            residual.of_reflected_light * exitance_squares(r));
+      r -= z;  // R r is the residual of B
       if ((exitance_squares(r) <= allowed).all()) return {std::move(b), std::move(h)};
-      descend(r, allowed, arithmetic, z, steps);
+      b.resize(kRows, 0);  // so as not to be held meanwhile
+      h.resize(kRows, 0);
+      descend(std::move(r), allowed, arithmetic, z, steps);
     }
     throw Error("the reference solution did not converge in " + std::to_string(kMaxSteps) +
                 " steps; a reflectance is too close to 1");
@@ -145,11 +153,12 @@ class ConjugateGradients {
 
   /// Improves `z`, with residual `r`, until the residual is small enough by the recursion of
   /// conjugate gradients (M. R. Hestenes and E. Stiefel, 1952).
-  void descend(Field r, const Totals& allowed, Arithmetic arithmetic, Field& z, int& steps) const {
-    Field p = r;
+  void descend(Field r, const Totals& allowed, Arithmetic arithmetic, Field& z, int& steps) {
+    Field p = r, q;
     Products rr = product(r, r);
     do {
-      const Field q = p - root_ * gather(root_ * p, arithmetic);
+      gather(root_ * p, arithmetic, q);
+      q = p - root_ * q;
       const Products alpha = quotient(rr, product(p, q));
       z += p.colwise() * alpha;
       r -= q.colwise() * alpha;
@@ -159,13 +168,18 @@ class ConjugateGradients {
   }
 
   /// F times `in`; links gather in single precision where that is enough.
-  Field gather(const Field& in, Arithmetic arithmetic) const {
+  void gather(const Field& in, Arithmetic arithmetic, Field& out) {
     using Links = std::shared_ptr<const LinkedFormFactors>;
-    if (const Links* links = std::get_if<Links>(&form_);
-        links != nullptr && arithmetic == Arithmetic::kSingle) {
-      return gather_along<float>(**links, in);
-    }
-    return std::visit([&](const auto& form) { return times<kRows>(form, in); }, form_);
+    const auto along = [&](const auto& form) {
+      if constexpr (!std::is_same_v<std::decay_t<decltype(form)>, Links>) {
+        out = times<kRows>(form, in);
+      } else if (arithmetic == Arithmetic::kSingle) {
+        single_.gather(*form, in, out);
+      } else {
+        double_.gather(*form, in, out);
+      }
+    };
+    std::visit(along, form_);
   }
 
   /// The squared area norms of R v.
@@ -191,6 +205,8 @@ class ConjugateGradients {
   const Form& form_;
   Eigen::Array<double, 1, Eigen::Dynamic> area_;
   Field root_, m0_;
+  LinkGatherer<float, kRows> single_;
+  LinkGatherer<double, kRows> double_;
 };
 
 Form best_form(const TransferData& data) {
@@ -214,7 +230,7 @@ template <int kLights>
 void solve_together(const System& system, std::span<const std::vector<Float3>> lights,
                     const Residual& residual, Quantity quantity,
                     std::vector<std::vector<Double3>>& solutions) {
-  const ConjugateGradients<kLights> solver(system, lights);
+  ConjugateGradients<kLights> solver(system, lights);
   const auto solved = solver.solve(residual);
   const auto& field =
       quantity == Quantity::kRadiosity ? solved.radiosity : solved.indirect_irradiance;

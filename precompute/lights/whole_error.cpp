@@ -24,9 +24,14 @@ constexpr double kStudent = 3.182;
 // Rays of a group, and of a patch of it (lab/111, lab/133).
 constexpr double kRaysOfGroup = 1 << 23, kLeastRays = 512, kMostRays = 4096;
 
-// Lights whose groups are spread together; lights that are gathered together: those of all patches
-// stay in the last cache.
-constexpr std::size_t kLightsAtOnce = 16, kLightsGathered = 32;
+// Lights that are gathered together: those of all patches stay in the last cache.
+constexpr std::size_t kLightsGathered = 32;
+
+/// Lights whose groups are spread together: a batch of solves for each rank, for up to eight ranks.
+std::size_t lights_spread() {
+  constexpr std::size_t kMostRanks = 8;
+  return std::min(Ranks().count(), kMostRanks) * ReferenceSolver::kBatchLights / kGroups;
+}
 
 // Rays take this part of the time of an estimate.
 constexpr double kTracingPart = 0.7;
@@ -264,8 +269,10 @@ void WholeErrorEstimator::spread(const IrradiancesOf& transfer, std::size_t firs
   }
 }
 
-WholeErrorEstimator::Products WholeErrorEstimator::products(std::size_t light) const {
-  const auto missing = std::span(missing_).subspan(light % kLightsAtOnce * kGroups, kGroups);
+/// `place`: of the light among those that were spread together.
+WholeErrorEstimator::Products WholeErrorEstimator::products(std::size_t light,
+                                                            std::size_t place) const {
+  const auto missing = std::span(missing_).subspan(place * kGroups, kGroups);
   const std::vector<float>& area = data_.patches.area;
   const std::vector<Float3>& compression = compression_[light];
   Products result;
@@ -283,17 +290,17 @@ WholeErrorEstimator::Products WholeErrorEstimator::products(std::size_t light) c
 WholeError WholeErrorEstimator::estimate(std::span<const std::uint32_t> shown_patch,
                                          const RayTracer& tracer, const IrradiancesOf& transfer,
                                          const Progress& progress) {
-  const std::size_t lights = compression_.size();
+  const std::size_t lights = compression_.size(), at_once = lights_spread();
   if (lights == 0) return {};
   const Progress tracing = part_of(progress, 0, kTracingPart);
   gather(shown_patch, tracer, tracing);
   std::vector<Replicates> of_links, of_whole;
   for (std::size_t l = 0; l < lights; ++l) {
-    if (l % kLightsAtOnce == 0) {
+    if (l % at_once == 0) {
       report_progress(progress, kTracingPart + (1 - kTracingPart) * l / lights);
-      spread(transfer, l, std::min(kLightsAtOnce, lights - l));
+      spread(transfer, l, std::min(at_once, lights - l));
     }
-    const Products p = products(l);
+    const Products p = products(l, l % at_once);
     of_links.push_back(
         root_of_pairs([&](std::size_t g, std::size_t h) { return p.of_groups[g][h]; }));
     of_whole.push_back(root_of_pairs([&](std::size_t g, std::size_t h) {

@@ -80,7 +80,7 @@ class WholeErrorEstimator {
               const Progress& progress);
   std::vector<Float3> residual(std::size_t group, std::size_t light) const;
   void spread(const IrradiancesOf& transfer, std::size_t first, std::size_t count);
-  Products products(std::size_t light) const;
+  Products products(std::size_t light, std::size_t place) const;
 
   const TransferData& data_;
   PatchRoles roles_;

@@ -72,32 +72,43 @@ void sort_lists(std::span<const std::uint64_t> end, std::span<const std::uint32_
 
 /// Checks that the nodes are in order of levels, that siblings are neighbours, and that the
 /// children of a node together have as many patches as the node.
-void check_tree(const FormFactorLinks& links, std::size_t n) {
-  const std::size_t m = links.first_child.size();
-  if (n == 0 || m != 2 * n - 1 || links.count.size() != m || links.count[0] != n) {
+void check_tree(const LinkedNodes& nodes, std::size_t n) {
+  const std::size_t m = nodes.first_child.size();
+  if (n == 0 || m != 2 * n - 1 || nodes.count.size() != m || nodes.count[0] != n) {
     refuse("the nodes are not a binary tree over the patches");
   }
   std::size_t next = 1;
   for (std::size_t k = 0; k < m; ++k) {
-    const std::uint32_t child = links.first_child[k];
+    const std::uint32_t child = nodes.first_child[k];
     if (child == kNone) {
-      if (links.count[k] != 1) refuse("a leaf is not one patch");
+      if (nodes.count[k] != 1) refuse("a leaf is not one patch");
       continue;
     }
     if (child != next || child <= k || next + 2 > m) refuse("the nodes are not in order of levels");
     const std::uint64_t both =
-        static_cast<std::uint64_t>(links.count[child]) + links.count[child + 1];
-    if (both != links.count[k]) refuse("children are not as large as their parent");
+        static_cast<std::uint64_t>(nodes.count[child]) + nodes.count[child + 1];
+    if (both != nodes.count[k]) refuse("children are not as large as their parent");
     next += 2;
   }
   if (next != m) refuse("a node has no parent");
 }
 
-void check_permutation(const FormFactorLinks& links, std::size_t n) {
+void check_permutation(const LinkedNodes& nodes, std::size_t n) {
   std::vector<bool> there(n, false);
-  for (const std::uint32_t patch : links.patch) {
+  for (const std::uint32_t patch : nodes.patch) {
     if (patch >= n || there[patch]) refuse("a patch is not in exactly one leaf");
     there[patch] = true;
+  }
+}
+
+void check_nodes(const LinkedNodes& nodes, std::size_t patch_count) {
+  if (nodes.patch.size() != patch_count || nodes.scale.size() != patch_count) {
+    refuse("they are for another number of patches");
+  }
+  check_tree(nodes, patch_count);
+  check_permutation(nodes, patch_count);
+  for (const float s : nodes.scale) {
+    if (!(s >= 0) || !std::isfinite(s)) refuse("a scale is not finite and >= 0");
   }
 }
 
@@ -113,33 +124,32 @@ void check_values(const FormFactorLinks& links) {
   for (const auto& g : links.gradient) {
     if (!std::ranges::all_of(g, is_finite)) refuse("a gradient is not finite");
   }
-  for (const float s : links.scale) {
-    if (!(s >= 0) || !is_finite(s)) refuse("a scale is not finite and >= 0");
-  }
+}
+
+/// The links, once they are checked.
+const FormFactorLinks& checked(const FormFactorLinks& links, std::size_t patch_count) {
+  check_links(links, patch_count);
+  return links;
 }
 
 }  // namespace
 
 void check_links(const FormFactorLinks& links, std::size_t patch_count) {
   const std::size_t l = links.pair.size();
-  if (links.patch.size() != patch_count || links.scale.size() != patch_count) {
-    refuse("they are for another number of patches");
-  }
+  check_nodes(links, patch_count);
   if (links.exchange_area.size() != l || links.gradient.size() != l) {
     refuse("their arrays differ in size");
   }
-  check_tree(links, patch_count);
-  check_permutation(links, patch_count);
   check_values(links);
 }
 
-std::vector<std::uint32_t> first_positions(const FormFactorLinks& links) {
-  std::vector<std::uint32_t> begin(links.first_child.size(), 0);
+std::vector<std::uint32_t> first_positions(const LinkedNodes& nodes) {
+  std::vector<std::uint32_t> begin(nodes.first_child.size(), 0);
   for (std::size_t k = 0; k < begin.size(); ++k) {
-    const std::uint32_t child = links.first_child[k];
+    const std::uint32_t child = nodes.first_child[k];
     if (child == kNone) continue;
     begin[child] = begin[k];
-    begin[child + 1] = begin[k] + links.count[child];
+    begin[child + 1] = begin[k] + nodes.count[child];
   }
   return begin;
 }
@@ -147,10 +157,12 @@ std::vector<std::uint32_t> first_positions(const FormFactorLinks& links) {
 /// The nodes and their links, in the order in which a gather visits them.
 class LinkedFormFactors::Tree {
  public:
-  Tree(const FormFactorLinks& tree, const GiveLinks& give, std::span<const float> area,
+  Tree(LinkedNodes nodes, const GiveLinks& give, std::span<const float> area,
        std::span<const Float3> centroid);
 
-  std::size_t patch_count() const { return scale_.size(); }
+  const LinkedNodes& nodes() const { return nodes_; }
+  std::span<const std::uint32_t> first_positions() const { return first_position_; }
+  std::size_t patch_count() const { return nodes_.patch.size(); }
   std::size_t node_count() const { return node_.size(); }
   std::size_t bytes() const;
   std::span<const PlainLink> plain_links(std::size_t node) const {
@@ -177,11 +189,10 @@ class LinkedFormFactors::Tree {
     Float3 from_parent{};  ///< centre minus the parent's centre, metres
   };
 
-  void build_tree(const FormFactorLinks& links, std::span<const float> area,
-                  std::span<const Float3> centroid);
+  void build_tree(std::span<const float> area, std::span<const Float3> centroid);
   void place_children(std::span<const std::array<double, 4>> sum);
   void find_levels();
-  void sort_links(const GiveLinks& give, std::span<const std::uint32_t> first_position);
+  void sort_links(const GiveLinks& give);
 
   template <typename Columns, typename Lanes>
   void pull(std::span<const Columns> in, LinkLightOf<Lanes>* light,
@@ -189,35 +200,36 @@ class LinkedFormFactors::Tree {
   template <typename Lanes, typename Columns>
   void push(LinkLightOf<Lanes>* arrived, std::span<Columns> out, const Scheduler& scheduler) const;
 
-  std::vector<Node> node_;                  ///< level by level
+  LinkedNodes nodes_;
+  std::vector<std::uint32_t> first_position_;  ///< [m]
+  std::vector<Node> node_;                     ///< level by level
   std::vector<std::uint32_t> level_begin_;  ///< first node of each level, then the number of nodes
   // Every link twice, sorted by the node that gathers.
   std::vector<std::uint64_t> plain_begin_, affine_begin_;  ///< [m + 1]
   std::vector<PlainLink> plain_;
   std::vector<IncomingLink> affine_;
-  std::vector<float> scale_;  ///< [n]
 };
 
-LinkedFormFactors::Tree::Tree(const FormFactorLinks& tree, const GiveLinks& give,
-                              std::span<const float> area, std::span<const Float3> centroid)
-    : scale_(tree.scale) {
-  check_links(tree, area.size());
+LinkedFormFactors::Tree::Tree(LinkedNodes nodes, const GiveLinks& give, std::span<const float> area,
+                              std::span<const Float3> centroid)
+    : nodes_(std::move(nodes)) {
+  check_nodes(nodes_, area.size());
   if (centroid.size() != area.size()) refuse("centroids and areas differ in number");
-  build_tree(tree, area, centroid);
-  sort_links(give, first_positions(tree));
+  first_position_ = rebounce::first_positions(nodes_);
+  build_tree(area, centroid);
+  sort_links(give);
 }
 
 /// Sets areas and centres of the nodes, and their levels.
-void LinkedFormFactors::Tree::build_tree(const FormFactorLinks& links, std::span<const float> area,
+void LinkedFormFactors::Tree::build_tree(std::span<const float> area,
                                          std::span<const Float3> centroid) {
-  const std::size_t m = links.first_child.size();
-  const std::vector<std::uint32_t> begin = first_positions(links);
+  const std::size_t m = nodes_.first_child.size();
   node_.resize(m);
   std::vector<std::array<double, 4>> sum(m);  // area times centroid; area
   for (std::size_t k = m; k-- > 0;) {
     Node& node = node_[k];
-    node.first_child = links.first_child[k];
-    if (node.first_child == kNone) node.patch = links.patch[begin[k]];
+    node.first_child = nodes_.first_child[k];
+    if (node.first_child == kNone) node.patch = nodes_.patch[first_position_[k]];
     for (int axis = 0; axis < 4; ++axis) {
       if (node.patch == kNone) {
         sum[k][axis] = sum[node.first_child][axis] + sum[node.first_child + 1][axis];
@@ -263,8 +275,7 @@ void LinkedFormFactors::Tree::find_levels() {
 /// Places the links by the node that gathers, each link once for each of its two nodes, and those
 /// of a node by the gradients that they have: counts them first, so that each has its place. Then
 /// sorts the links of a node that have the same gradients by the first position of where they lead.
-void LinkedFormFactors::Tree::sort_links(const GiveLinks& give,
-                                         std::span<const std::uint32_t> first_position) {
+void LinkedFormFactors::Tree::sort_links(const GiveLinks& give) {
   const std::size_t m = node_.size();
   std::vector<std::uint64_t> plain(m + 1, 0), affine((kGradientKinds - 1) * m + 1, 0);
   const auto place = [&](std::uint32_t node, unsigned gradients) -> std::uint64_t* {
@@ -291,8 +302,8 @@ void LinkedFormFactors::Tree::sort_links(const GiveLinks& give,
     }
   });
   // Each place has moved to the end of its links.
-  sort_lists(plain, first_position, plain_);
-  sort_lists(affine, first_position, affine_);
+  sort_lists(plain, first_position_, plain_);
+  sort_lists(affine, first_position_, affine_);
 }
 
 std::size_t LinkedFormFactors::Tree::bytes() const {
@@ -326,7 +337,7 @@ void LinkedFormFactors::Tree::pull(std::span<const Columns> in, LinkLightOf<Lane
       LinkLightOf<Lanes> sum{};
       if (node.patch != kNone) {
         const Columns& x = in[node.patch];
-        for (std::size_t c = 0; c < x.size(); ++c) sum.mean[c] = scale_[node.patch] * x[c];
+        for (std::size_t c = 0; c < x.size(); ++c) sum.mean[c] = nodes_.scale[node.patch] * x[c];
       } else {
         for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
           const Node& child = node_[c];
@@ -352,7 +363,8 @@ void LinkedFormFactors::Tree::push(LinkLightOf<Lanes>* arrived, std::span<Column
       const Node& node = node_[k];
       const LinkLightOf<Lanes>& here = arrived[k];
       if (node.patch != kNone) {
-        const typename Lanes::value_type scale = scale_[node.patch], factor = scale / node.area;
+        const typename Lanes::value_type scale = nodes_.scale[node.patch],
+                                         factor = scale / node.area;
         Columns& y = out[node.patch];
         for (std::size_t c = 0; c < y.size(); ++c) y[c] = factor * here.mean[c];
         return;
@@ -371,11 +383,11 @@ void LinkedFormFactors::Tree::push(LinkLightOf<Lanes>* arrived, std::span<Column
 
 LinkedFormFactors::LinkedFormFactors(const FormFactorLinks& links, std::span<const float> area,
                                      std::span<const Float3> centroid)
-    : LinkedFormFactors(links, each_of(links), area, centroid) {}
+    : LinkedFormFactors(LinkedNodes(checked(links, area.size())), each_of(links), area, centroid) {}
 
-LinkedFormFactors::LinkedFormFactors(const FormFactorLinks& tree, const GiveLinks& give,
+LinkedFormFactors::LinkedFormFactors(LinkedNodes nodes, const GiveLinks& give,
                                      std::span<const float> area, std::span<const Float3> centroid)
-    : tree_(std::make_shared<const Tree>(tree, give, area, centroid)) {}
+    : tree_(std::make_shared<const Tree>(std::move(nodes), give, area, centroid)) {}
 
 std::size_t LinkedFormFactors::patch_count() const {
   return tree_->patch_count();
@@ -387,6 +399,14 @@ std::size_t LinkedFormFactors::node_count() const {
 
 std::size_t LinkedFormFactors::bytes() const {
   return tree_->bytes();
+}
+
+const LinkedNodes& LinkedFormFactors::nodes() const {
+  return tree_->nodes();
+}
+
+std::span<const std::uint32_t> LinkedFormFactors::first_positions() const {
+  return tree_->first_positions();
 }
 
 std::span<const PlainLink> LinkedFormFactors::plain_links(std::uint32_t node) const {
@@ -408,18 +428,48 @@ void LinkedFormFactors::do_gather(std::span<const Float3> in, std::span<Float3> 
 }
 
 template <typename Columns>
-void LinkedFormFactors::gather(std::span<const Columns> in, std::span<Columns> out) const {
+void LinkedFormFactors::gather(std::span<const Columns> in, std::span<Columns> out,
+                               std::vector<Columns>& workspace) const {
+  using Light = LinkLightOf<Columns>;
   check_size("links: light", in.size(), patch_count());
   check_size("links: gathered light", out.size(), patch_count());
-  std::vector<LinkLightOf<Columns>> light(node_count()), arrived(node_count());
-  tree_->gather(in, out, light.data(), arrived.data(), fastest_gather<Columns>(), {});
+  workspace.resize(2 * node_count() * (sizeof(Light) / sizeof(Columns)));
+  auto* light = reinterpret_cast<Light*>(workspace.data());
+  tree_->gather(in, out, light, light + node_count(), fastest_gather<Columns>(), {});
 }
 
 template void LinkedFormFactors::gather(std::span<const std::array<float, 3>>,
-                                        std::span<std::array<float, 3>>) const;
-template void LinkedFormFactors::gather(std::span<const ManyFloats>, std::span<ManyFloats>) const;
+                                        std::span<std::array<float, 3>>,
+                                        std::vector<std::array<float, 3>>&) const;
+template void LinkedFormFactors::gather(std::span<const ManyFloats>, std::span<ManyFloats>,
+                                        std::vector<ManyFloats>&) const;
 template void LinkedFormFactors::gather(std::span<const std::array<double, 3>>,
-                                        std::span<std::array<double, 3>>) const;
-template void LinkedFormFactors::gather(std::span<const ManyDoubles>, std::span<ManyDoubles>) const;
+                                        std::span<std::array<double, 3>>,
+                                        std::vector<std::array<double, 3>>&) const;
+template void LinkedFormFactors::gather(std::span<const ManyDoubles>, std::span<ManyDoubles>,
+                                        std::vector<ManyDoubles>&) const;
+
+FormFactorLinks flat_links(const LinkedFormFactors& form_factors) {
+  FormFactorLinks links{form_factors.nodes(), {}, {}, {}};
+  const auto for_each = [&](const auto& visit) {
+    for (std::uint32_t node = 0; node < form_factors.node_count(); ++node) {
+      form_factors.for_each_link(node, [&](const IncomingLink& link) {
+        if (node <= link.from) visit(node, link);
+      });
+    }
+  };
+  std::size_t count = 0;
+  for_each([&](std::uint32_t, const IncomingLink&) { ++count; });
+  links.pair.reserve(count);
+  links.exchange_area.reserve(count);
+  links.gradient.reserve(count);
+  for_each([&](std::uint32_t node, const IncomingLink& link) {
+    const Float3 g = to_floats(link.gradient_to), h = to_floats(link.gradient_from);
+    links.pair.push_back({node, link.from});
+    links.exchange_area.push_back(link.exchange_area);
+    links.gradient.push_back({g[0], g[1], g[2], h[0], h[1], h[2]});
+  });
+  return links;
+}
 
 }  // namespace rebounce

@@ -14,32 +14,30 @@
 
 namespace rebounce {
 
-/// Form factors as links between nodes of a binary tree of patches, in flat arrays.
+/// A binary tree of patches, whose nodes links join.
+struct LinkedNodes {
+  std::vector<std::uint32_t> patch;        ///< [n] patch at each position
+  std::vector<std::uint32_t> first_child;  ///< [m] kNone for a leaf; the second child is the next
+  std::vector<std::uint32_t> count;        ///< [m] patches of a node
+  /// [n] F(i,j) is that of the links times scale(i) scale(j), which corrects the row sums; 0 for a
+  /// patch that exchanges nothing.
+  std::vector<float> scale;
+
+  bool empty() const { return patch.empty(); }
+};
+
+/// Form factors as links between nodes of a binary tree of patches, in flat arrays, as files have
+/// them.
 ///
 /// A link (a, b) stands for all pairs of a patch of a and a patch of b. Between points x of a and y
 /// of b it approximates the kernel by
 ///   (exchange_area + gradient_a . (x - center_a) + gradient_b . (y - center_b)) / (area_a area_b),
 /// where the centre of a node is the area-weighted mean of its patches' centroids. A link works in
 /// both directions.
-struct FormFactorLinks {
-  std::vector<std::uint32_t> patch;        ///< [n] patch at each position
-  std::vector<std::uint32_t> first_child;  ///< [m] kNone for a leaf; the second child is the next
-  std::vector<std::uint32_t> count;        ///< [m] patches of a node
+struct FormFactorLinks : LinkedNodes {
   std::vector<std::array<std::uint32_t, 2>> pair;  ///< [l] nodes a and b
   std::vector<float> exchange_area;                ///< [l] m²
   std::vector<std::array<float, 6>> gradient;      ///< [l] m: gradient_a, gradient_b
-  /// [n] F(i,j) is that of the links times scale(i) scale(j), which corrects the row sums; 0 for a
-  /// patch that exchanges nothing.
-  std::vector<float> scale;
-
-  bool empty() const { return patch.empty(); }
-
-  /// Frees the links; the tree and the scales stay.
-  void drop_links() {
-    pair = {};
-    exchange_area = {};
-    gradient = {};
-  }
 };
 
 /// One of the links of FormFactorLinks, with gradients as LinkedFormFactors stores them.
@@ -56,8 +54,8 @@ using GiveLinks = std::function<void(const std::function<void(const NodeLink&)>&
 /// or if a link does not join two nodes of it.
 void check_links(const FormFactorLinks& links, std::size_t patch_count);
 
-/// [m] position of the first patch of each node. `links` must be valid (check_links).
-std::vector<std::uint32_t> first_positions(const FormFactorLinks& links);
+/// [m] position of the first patch of each node. The nodes must be valid (check_links).
+std::vector<std::uint32_t> first_positions(const LinkedNodes& nodes);
 
 /// Gathers with links: pulls light up the tree, gathers it at every level along the links, and
 /// pushes what arrived down again (P. Hanrahan, D. Salzman, L. Aupperle, "A rapid hierarchical
@@ -71,15 +69,19 @@ class LinkedFormFactors final : public FormFactorOperator {
   LinkedFormFactors(const FormFactorLinks& links, std::span<const float> area,
                     std::span<const Float3> centroid);
 
-  /// The same with links that have no arrays: those of `tree` are empty, and `give` is called in
-  /// the constructor. Exchange areas and gradients must be finite.
-  LinkedFormFactors(const FormFactorLinks& tree, const GiveLinks& give, std::span<const float> area,
+  /// The same with links that are in no arrays: `give` is called in the constructor. Exchange areas
+  /// and gradients must be finite.
+  LinkedFormFactors(LinkedNodes nodes, const GiveLinks& give, std::span<const float> area,
                     std::span<const Float3> centroid);
 
   std::size_t patch_count() const override;
   std::size_t node_count() const;
   std::size_t bytes() const override;
   std::size_t workspace_size() const override;
+
+  const LinkedNodes& nodes() const;
+  /// [m] position of the first patch of each node.
+  std::span<const std::uint32_t> first_positions() const;
 
   /// The links of a node without gradients, by the first position of the nodes that they lead to,
   /// and those with gradients, by these (gradients_of) and then likewise.
@@ -96,9 +98,11 @@ class LinkedFormFactors final : public FormFactorOperator {
   using FormFactorOperator::gather;
 
   /// Gathers several lights at once. `Columns` is an array of 3 or 24 floats or doubles: the
-  /// channels of one or of eight lights; sums have the same type. Allocates its workspace.
+  /// channels of one or of eight lights; sums have the same type. `workspace` is made as large as
+  /// it has to be; give it again, as new memory takes a third of the time.
   template <typename Columns>
-  void gather(std::span<const Columns> in, std::span<Columns> out) const;
+  void gather(std::span<const Columns> in, std::span<Columns> out,
+              std::vector<Columns>& workspace) const;
 
  private:
   void do_gather(std::span<const Float3> in, std::span<Float3> out, std::span<float> workspace,
@@ -107,5 +111,9 @@ class LinkedFormFactors final : public FormFactorOperator {
   class Tree;
   std::shared_ptr<const Tree> tree_;
 };
+
+/// The same form factors in flat arrays. Links are in the order of their first nodes, which come
+/// before the second ones; LinkedFormFactors of them has the same bits.
+FormFactorLinks flat_links(const LinkedFormFactors& form_factors);
 
 }  // namespace rebounce

@@ -60,16 +60,16 @@ void share(const Ranks& ranks, std::span<std::vector<AffineLink>> lists) {
   }
 }
 
-std::vector<NodeSpread> spread_nodes(const FormFactorLinks& links, std::span<const float> area,
+std::vector<NodeSpread> spread_nodes(const LinkedNodes& tree, std::span<const float> area,
                                      std::span<const Float3> centroid) {
-  const std::size_t m = links.first_child.size();
+  const std::size_t m = tree.first_child.size();
   std::vector<NodeSpread> nodes(m);
-  const std::vector<std::uint32_t> begin = first_positions(links);
+  const std::vector<std::uint32_t> begin = first_positions(tree);
   for (std::size_t k = m; k-- > 0;) {
     NodeSpread& node = nodes[k];
-    const std::uint32_t child = links.first_child[k];
+    const std::uint32_t child = tree.first_child[k];
     if (child == kNone) {
-      const std::uint32_t patch = links.patch[begin[k]];
+      const std::uint32_t patch = tree.patch[begin[k]];
       node.area = area[patch];
       for (int axis = 0; axis < 3; ++axis) {
         node.center[axis] = centroid[patch][static_cast<std::size_t>(axis)];

@@ -21,9 +21,8 @@ struct NodeSpread {
   Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();
 };
 
-/// The spreads of the nodes of the tree in `links`, [m]; `area` [n] in m², `centroid` [n] in
-/// metres.
-std::vector<NodeSpread> spread_nodes(const FormFactorLinks& links, std::span<const float> area,
+/// The spreads of the nodes of a tree, [m]; `area` [n] in m², `centroid` [n] in metres.
+std::vector<NodeSpread> spread_nodes(const LinkedNodes& tree, std::span<const float> area,
                                      std::span<const Float3> centroid);
 
 /// A link of FormFactorLinks in double precision.

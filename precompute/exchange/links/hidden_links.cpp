@@ -22,9 +22,9 @@ HiddenLinks::HiddenLinks(const LinkTree& tree, std::span<const Link> links)
   }
   std::vector<std::pair<std::uint32_t, std::uint32_t>> both;
   for (const Link& link : links) {
-    if (link.exchange_area > 0 || (tree[link.a].is_leaf() && tree[link.b].is_leaf())) continue;
-    both.emplace_back(link.a, link.b);
-    both.emplace_back(link.b, link.a);
+    if (link.exchange_area > 0 || link.joins_patches()) continue;
+    both.emplace_back(link.a(), link.b());
+    both.emplace_back(link.b(), link.a());
   }
   std::ranges::sort(both);
   for (const auto& [node, other] : both) {

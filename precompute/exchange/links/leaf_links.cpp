@@ -19,11 +19,18 @@ struct LeafLinks::Scratch {
 
 LeafLinks::LeafLinks(const LinkTree& tree, const PatchGeometry& geometry, std::span<Link> links)
     : geometry_(geometry), links_(links), begin_(tree.patches().size() + 1, 0) {
-  for (std::size_t l = 0; l < links.size(); ++l) {
-    const LinkNode &a = tree[links[l].a], &b = tree[links[l].b];
-    if (!a.is_leaf() || !b.is_leaf()) continue;
-    const auto [row, column] = std::minmax({tree.leaf_patch(a), tree.leaf_patch(b)});
-    if (links[l].measured_area >= 0 && !is_coarse_pair(geometry, row, column)) continue;
+  const auto patches_of = [&](const Link& link) {
+    return std::minmax({tree.leaf_patch(tree[link.a()]), tree.leaf_patch(tree[link.b()])});
+  };
+  const auto is_measured_now = [&](const Link& link) {
+    if (!link.joins_patches()) return false;
+    const auto [row, column] = patches_of(link);
+    return link.of_patches().measured_area < 0 || is_coarse_pair(geometry, row, column);
+  };
+  pairs_.reserve(static_cast<std::size_t>(std::ranges::count_if(links, is_measured_now)));
+  for (std::uint32_t l = 0; l < links.size(); ++l) {
+    if (!is_measured_now(links[l])) continue;
+    const auto [row, column] = patches_of(links[l]);
     pairs_.push_back({row, column, l});
     ++begin_[row + 1];
   }
@@ -90,15 +97,14 @@ void LeafLinks::share_measured(const Ranks& ranks) {
   std::vector<std::vector<std::array<float, 2>>> by_row(begin_.size() - 1);
   for (const Pair& pair : pairs_) {
     const Link& link = links_[pair.link];
-    by_row[pair.row].push_back({link.exchange_area, link.variance});
+    by_row[pair.row].push_back({link.exchange_area, link.of_patches().variance});
   }
   ranks.share(std::span(by_row));
   for (std::uint32_t i = 0; i < by_row.size(); ++i) {
     auto next = by_row[i].begin();
     for (const Pair& pair : row(i)) {
-      Link& link = links_[pair.link];
-      link.exchange_area = link.measured_area = (*next)[0];
-      link.variance = (*next++)[1];
+      const auto [area, variance] = *next++;
+      links_[pair.link].set_measured(area, variance);
     }
   }
 }
@@ -120,10 +126,12 @@ void LeafLinks::measure_row(std::uint32_t i, const PairExchange& exchange, int p
   auto entry = scratch.entries.begin();
   for (const Pair& pair : row(i)) {
     const bool exchanges = entry != scratch.entries.end() && entry->column == pair.column;
-    Link& link = links_[pair.link];
-    link.exchange_area = link.measured_area = exchanges ? entry->exchange_area : 0;
-    link.variance = exchanges ? static_cast<float>(entry->variance()) : 0;
-    if (exchanges) ++entry;
+    if (exchanges) {
+      links_[pair.link].set_measured(entry->exchange_area, static_cast<float>(entry->variance()));
+      ++entry;
+    } else {
+      links_[pair.link].set_measured(0, 0);
+    }
   }
 }
 

@@ -38,7 +38,7 @@ class LeafLinks {
  private:
   struct Pair {
     std::uint32_t row, column;  ///< patches, row <= column
-    std::size_t link;
+    std::uint32_t link;
   };
   struct Scratch;
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -37,13 +38,13 @@ std::vector<std::uint32_t> find_rooms(const ExchangeMatrix& exchange) {
   return numbers_of(sets, n);
 }
 
-/// The same from links; `tree` is theirs.
-std::vector<std::uint32_t> find_rooms(const FormFactorLinks& tree, const LinkedFormFactors& links) {
-  const std::size_t m = tree.first_child.size(), n = tree.patch.size();
-  const std::vector<std::uint32_t> begin = first_positions(tree);
-  DisjointSets sets(static_cast<std::uint32_t>(n));
+/// The same from links.
+std::vector<std::uint32_t> find_rooms(const LinkedFormFactors& links) {
+  const LinkedNodes& tree = links.nodes();
+  const std::span<const std::uint32_t> begin = links.first_positions();
+  DisjointSets sets(static_cast<std::uint32_t>(tree.patch.size()));
   const auto first_patch = [&](std::uint32_t node) { return tree.patch[begin[node]]; };
-  for (std::uint32_t node = 0; node < m; ++node) {
+  for (std::uint32_t node = 0; node < begin.size(); ++node) {
     if (links.plain_links(node).empty() && links.affine_links(node).empty()) continue;
     for (std::uint32_t k = 1; k < tree.count[node]; ++k) {
       sets.join(first_patch(node), tree.patch[begin[node] + k]);
@@ -52,7 +53,7 @@ std::vector<std::uint32_t> find_rooms(const FormFactorLinks& tree, const LinkedF
       sets.join(first_patch(node), first_patch(link.from));
     });
   }
-  return numbers_of(sets, n);
+  return numbers_of(sets, tree.patch.size());
 }
 
 /// [n] Groups for the tree, so that most nodes are of one room: each of the largest rooms is a
@@ -112,9 +113,8 @@ Totals totals_of(const ExchangeMatrix& exchange, const std::vector<float>& area)
 }
 
 /// The same from links; the norm leaves out what patches lose by their scales.
-Totals totals_of(const FormFactorLinks& tree, const LinkedFormFactors& links,
-                 const PatchTable& patches) {
-  const std::vector<NodeSpread> nodes = spread_nodes(tree, patches.area, patches.centroid);
+Totals totals_of(const LinkedFormFactors& links, const PatchTable& patches) {
+  const std::vector<NodeSpread> nodes = spread_nodes(links.nodes(), patches.area, patches.centroid);
   Totals totals{row_sums(links), 0};
   for (std::uint32_t node = 0; node < nodes.size(); ++node) {
     links.for_each_link(node, [&](const IncomingLink& link) {
@@ -141,13 +141,14 @@ void check_error_per_link(double error_per_link) {
   }
 }
 
-ClusterTree tree_of(const FormFactorLinks& links) {
+ClusterTree tree_of(const LinkedFormFactors& links) {
+  const LinkedNodes& nodes = links.nodes();
+  const std::span<const std::uint32_t> begin = links.first_positions();
   ClusterTree tree;
-  tree.patch = links.patch;
-  const std::vector<std::uint32_t> begin = first_positions(links);
+  tree.patch = nodes.patch;
   for (std::size_t k = 0; k < begin.size(); ++k) {
     tree.clusters.push_back(
-        {.begin = begin[k], .count = links.count[k], .first_child = links.first_child[k]});
+        {.begin = begin[k], .count = nodes.count[k], .first_child = nodes.first_child[k]});
   }
   return tree;
 }
@@ -188,15 +189,14 @@ FormFactorLinks fit_links(const ExchangeMatrix& exchange, const PatchTable& patc
              patches, error_per_link, progress);
 }
 
-FormFactorLinks fit_links(const FormFactorLinks& tree,
-                          const std::shared_ptr<const LinkedFormFactors>& links,
+FormFactorLinks fit_links(const std::shared_ptr<const LinkedFormFactors>& links,
                           const PatchTable& patches, double error_per_link,
                           const Progress& progress) {
   check_error_per_link(error_per_link);
-  const LinkedPairs pairs(tree, links, patches);
+  const LinkedPairs pairs(links, patches);
   // The fit reuses the tree of `links`: in another tree, links would be cut where its nodes end.
-  const SpreadTree fitted = spread_tree(tree_of(tree), patches, find_rooms(tree, *links));
-  return fit(fitted, pairs, totals_of(tree, *links, patches), patches, error_per_link, progress);
+  const SpreadTree tree = spread_tree(tree_of(*links), patches, find_rooms(*links));
+  return fit(tree, pairs, totals_of(*links, patches), patches, error_per_link, progress);
 }
 
 }  // namespace rebounce

@@ -30,12 +30,11 @@ inline constexpr double kErrorPerLink = 7e-4;
 FormFactorLinks fit_links(const ExchangeMatrix& exchange, const PatchTable& patches,
                           double error_per_link = kErrorPerLink, const Progress& progress = {});
 
-/// Fits links to the pairs that other links stand for. `tree` is theirs; its own links are not
-/// read. Refinement makes far more links than necessary: it splits nodes before it knows the
-/// result, and splits down to patches where row sums are doubtful. Nothing with n² entries is
-/// stored. Throws Error if `links` are not of these patches.
-FormFactorLinks fit_links(const FormFactorLinks& tree,
-                          const std::shared_ptr<const LinkedFormFactors>& links,
+/// Fits links to the pairs that other links stand for. Refinement makes far more links than
+/// necessary: it splits nodes before it knows the result, and splits down to patches where row sums
+/// are doubtful. Nothing with n² entries is stored. Throws Error if `links` are not of these
+/// patches.
+FormFactorLinks fit_links(const std::shared_ptr<const LinkedFormFactors>& links,
                           const PatchTable& patches, double error_per_link = kErrorPerLink,
                           const Progress& progress = {});
 

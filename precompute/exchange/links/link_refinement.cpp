@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "precompute/base/parallel_loop.h"
@@ -17,6 +18,9 @@ namespace {
 
 // The points of a plane are off it by less than this fraction of its size.
 constexpr double kPlane = 1e-7;
+
+// Links have indices of 32 bits.
+constexpr std::size_t kMostLinks = std::numeric_limits<std::uint32_t>::max();
 
 // Pairs of a generation that one rank decides before the next rank's turn.
 constexpr std::size_t kPairsInTurn = 64;
@@ -53,7 +57,9 @@ LinkRefinement::LinkRefinement(const LinkTree& tree, const ShadowRays& shadow_ra
     : tree_(tree),
       shadow_rays_(shadow_rays),
       settings_(settings),
-      rays_(tree, shadow_rays, tracer, settings.seed) {}
+      rays_(tree, shadow_rays, tracer, settings.seed) {
+  if (tree.nodes().size() > Link::kMostNodes) throw Error("links: too many patches");
+}
 
 /// Takes out the links for which `again`(link) is true, as candidates.
 template <typename Again>
@@ -61,7 +67,7 @@ std::vector<LinkRefinement::Candidate> LinkRefinement::take(const Again& again) 
   std::vector<Candidate> taken;
   std::erase_if(links_, [&](const Link& link) {
     if (!again(link)) return false;
-    taken.push_back({link.a, link.b, link.view});
+    taken.push_back({link.a(), link.b(), link.view()});
     return true;
   });
   return taken;
@@ -70,10 +76,10 @@ std::vector<LinkRefinement::Candidate> LinkRefinement::take(const Again& again) 
 void LinkRefinement::refine(double epsilon, const Progress& progress) {
   const bool first = epsilon_ == 0;
   epsilon_ = epsilon;
-  std::erase_if(links_, [](const Link& link) { return link.added; });
+  std::erase_if(links_, [](const Link& link) { return link.is_added(); });
   if (first) return refine(std::vector<Candidate>{{0, 0, View::kUnknown}}, progress);
   std::vector<Candidate> again =
-      take([&](const Link& link) { return link.least_epsilon >= epsilon; });
+      take([&](const Link& link) { return link.of_nodes().least_epsilon >= epsilon; });
   again.insert(again.end(), empty_.begin(), empty_.end());
   empty_.clear();
   refine(std::move(again), progress);
@@ -102,8 +108,7 @@ void LinkRefinement::revise(const std::vector<bool>& doubtful, const Progress& p
   doubtful_.resize(with.size(), 0);
   for (std::size_t k = 0; k < with.size(); ++k) doubtful_[k] |= with[k];
   refine(take([&](const Link& link) {
-           const bool leaves = tree_[link.a].is_leaf() && tree_[link.b].is_leaf();
-           return !leaves && (with_new[link.a] != 0 || with_new[link.b] != 0);
+           return !link.joins_patches() && (with_new[link.a()] != 0 || with_new[link.b()] != 0);
          }),
          progress);
 }
@@ -139,8 +144,7 @@ LinkRefinement::Forecast LinkRefinement::forecast(std::vector<Candidate> generat
       const Outcome& outcome = outcomes[k];
       if (outcome.kind == Outcome::Kind::kLink) {
         const Link& link = outcome.link;
-        const bool leaves = tree_[link.a].is_leaf() && tree_[link.b].is_leaf();
-        if (leaves || link.exchange_area > 0) found.links += weight;
+        if (link.joins_patches() || link.exchange_area > 0) found.links += weight;
       } else if (outcome.kind != Outcome::Kind::kNothing) {
         append_children(generation[k], outcome, next);
       }
@@ -157,7 +161,7 @@ void LinkRefinement::add(std::span<const std::pair<std::uint32_t, std::uint32_t>
   for (const auto& [a, b] : leaves) candidates.push_back({a, b, View::kUnknown});
   const std::size_t known = links_.size();
   refine(std::move(candidates), {});
-  for (Link& link : links().subspan(known)) link.added = true;
+  for (Link& link : links().subspan(known)) link.set_added();
 }
 
 void LinkRefinement::refine(std::vector<Candidate> generation, const Progress& progress) {
@@ -186,6 +190,7 @@ void LinkRefinement::refine(std::vector<Candidate> generation, const Progress& p
 void LinkRefinement::append(std::vector<std::vector<Link>> made) {
   std::size_t count = links_.size();
   for (const std::vector<Link>& links : made) count += links.size();
+  if (count > kMostLinks) throw Error("links: too many; ask for a larger link_epsilon");
   if (count > links_.capacity()) links_.reserve(2 * count);
   for (std::vector<Link>& links : made) {
     links_.insert(links_.end(), links.begin(), links.end());
@@ -238,14 +243,9 @@ LinkRefinement::Outcome LinkRefinement::link_patches(const Candidate& pair) cons
                           ? std::min(geometry.area(i), geometry.area(j))
                           : shadow_rays_.unoccluded(std::min(i, j), std::max(i, j));
   if (most <= 0) return {};
-  return {.kind = Outcome::Kind::kLink,
-          .view = View::kUnknown,
-          .link = {.a = pair.a,
-                   .b = pair.b,
-                   .exchange_area = 0,
-                   .unoccluded_area = static_cast<float>(most),
-                   .gradient_a = {},
-                   .gradient_b = {}}};
+  Link link(pair.a, pair.b);
+  link.unoccluded_area = static_cast<float>(most);
+  return {Outcome::Kind::kLink, View::kUnknown, link};
 }
 
 bool LinkRefinement::needs_all_rays(const Candidate& pair) const {
@@ -303,16 +303,13 @@ LinkRefinement::Outcome LinkRefinement::link_mixed(const Candidate& pair, const 
 LinkRefinement::Outcome LinkRefinement::make_link(const Candidate& pair, const PairKernel& kernel,
                                                   const LinkRays::Visibility& visible,
                                                   double least_squared) const {
-  return {.kind = Outcome::Kind::kLink,
-          .view = View::kUnknown,
-          .link = {.a = pair.a,
-                   .b = pair.b,
-                   .exchange_area = static_cast<float>(visible.part * kernel.unoccluded()),
-                   .unoccluded_area = static_cast<float>(kernel.unoccluded()),
-                   .gradient_a = stored(visible.part * kernel.gradient_a()),
-                   .gradient_b = stored(visible.part * kernel.gradient_b()),
-                   .least_epsilon = static_cast<float>(std::sqrt(least_squared)),
-                   .view = pair.view}};
+  Link link(pair.a, pair.b, pair.view,
+            {.gradient_a = stored(visible.part * kernel.gradient_a()),
+             .gradient_b = stored(visible.part * kernel.gradient_b()),
+             .least_epsilon = static_cast<float>(std::sqrt(least_squared))});
+  link.exchange_area = static_cast<float>(visible.part * kernel.unoccluded());
+  link.unoccluded_area = static_cast<float>(kernel.unoccluded());
+  return {Outcome::Kind::kLink, View::kUnknown, link};
 }
 
 /// Splits the node that looks larger from the other: the distance is the same for both.

@@ -6,31 +6,15 @@
 #include <vector>
 
 #include "precompute/base/progress.h"
+#include "precompute/exchange/links/link.h"
 #include "precompute/exchange/links/link_rays.h"
 #include "precompute/exchange/links/link_tree.h"
 #include "precompute/exchange/links/pair_kernel.h"
 #include "precompute/exchange/pairs/form_factor_settings.h"
 #include "precompute/exchange/pairs/shadow_rays.h"
 #include "runtime/rays/ray_tracer.h"
-#include "transfer/base/bfloat16.h"
 
 namespace rebounce {
-
-/// The exchange of two nodes of a LinkTree, for all pairs of their patches together. Between a
-/// point x of a and a point y of b the kernel is approximated by
-///   (exchange_area + gradient_a . (x - center_a) + gradient_b . (y - center_b)) / (area_a area_b).
-struct Link {
-  std::uint32_t a, b;
-  float exchange_area;    ///< m²
-  float unoccluded_area;  ///< m²: the exchange area with nothing between, the upper limit
-  BFloat16x3 gradient_a, gradient_b;  ///< m; so LinkedFormFactors stores them too
-  float variance = 0;  ///< m⁴, of the exchange area of two patches; of nodes it is not known
-  float measured_area = -1;  ///< m²: that of two patches before closure; below 0: not measured
-  float least_epsilon = 0;   ///< the link is near enough where epsilon is above this
-  /// What the last rays between ancestors of the pair told.
-  enum class View : std::uint8_t { kUnknown, kClear, kMixed } view = View::kUnknown;
-  bool added = false;  ///< two patches that hemisphere rays join, in a hidden link of nodes
-};
 
 /// Hierarchical refinement (P. Hanrahan, D. Salzman and L. Aupperle, "A rapid hierarchical
 /// radiosity algorithm", SIGGRAPH 1991): a pair of nodes gets a link if the approximation is close
@@ -84,7 +68,7 @@ class LinkRefinement {
   }
 
  private:
-  using View = Link::View;
+  using View = LinkView;
   struct Candidate {
     std::uint32_t a, b;
     View view;

@@ -75,9 +75,10 @@ std::vector<Moments> gather_nodes(const std::vector<Moments>& mean, std::span<co
     arrived[to].first += mean[from].sum * to_dvec3(to_floats(gradient_to));
   };
   for (const Link& link : links) {
-    add(link.a, link.b, link.exchange_area, link.gradient_a, link.gradient_b);
-    if (link.a == link.b) continue;
-    add(link.b, link.a, link.exchange_area, link.gradient_b, link.gradient_a);
+    const Link::OfNodes of_nodes = link.of_nodes();
+    add(link.a(), link.b(), link.exchange_area, of_nodes.gradient_a, of_nodes.gradient_b);
+    if (link.a() == link.b()) continue;
+    add(link.b(), link.a(), link.exchange_area, of_nodes.gradient_b, of_nodes.gradient_a);
   }
   return arrived;
 }
@@ -148,14 +149,13 @@ void scale_to(const LinkTree& tree, std::span<const Link> links, std::span<const
 }
 
 /// True for two patches with nothing between them.
-bool is_certain(const LinkTree& tree, const Link& link) {
-  return tree[link.a].is_leaf() && tree[link.b].is_leaf() &&
-         link.exchange_area == link.unoccluded_area;
+bool is_certain(const Link& link) {
+  return link.joins_patches() && link.exchange_area == link.unoccluded_area;
 }
 
 /// The two patches of a link between patches, ascending.
 std::pair<std::uint32_t, std::uint32_t> row_and_column(const LinkTree& tree, const Link& link) {
-  return std::minmax({tree.leaf_patch(tree[link.a]), tree.leaf_patch(tree[link.b])});
+  return std::minmax({tree.leaf_patch(tree[link.a()]), tree.leaf_patch(tree[link.b()])});
 }
 
 /// What the links between two patches add to each row.
@@ -163,21 +163,21 @@ std::vector<double> leaf_sums(const LinkTree& tree, std::span<const Link> links,
                               std::size_t patch_count) {
   std::vector<double> sum(patch_count, 0.0);
   for (const Link& link : links) {
-    const LinkNode &a = tree[link.a], &b = tree[link.b];
-    if (!a.is_leaf() || !b.is_leaf()) continue;
+    if (!link.joins_patches()) continue;
+    const LinkNode &a = tree[link.a()], &b = tree[link.b()];
     sum[tree.leaf_patch(a)] += link.exchange_area / a.area;
-    if (link.a != link.b) sum[tree.leaf_patch(b)] += link.exchange_area / b.area;
+    if (link.a() != link.b()) sum[tree.leaf_patch(b)] += link.exchange_area / b.area;
   }
   return sum;
 }
 
 /// The links between patches whose variance is known, sorted by their rows and columns.
-std::vector<std::size_t> yielding_links(const LinkTree& tree, std::span<const Link> links) {
-  std::vector<std::size_t> yielding;
-  for (std::size_t l = 0; l < links.size(); ++l) {
-    if (links[l].variance > 0 && links[l].exchange_area > 0) yielding.push_back(l);
+std::vector<std::uint32_t> yielding_links(const LinkTree& tree, std::span<const Link> links) {
+  std::vector<std::uint32_t> yielding;
+  for (std::uint32_t l = 0; l < links.size(); ++l) {
+    if (links[l].of_patches().variance > 0 && links[l].exchange_area > 0) yielding.push_back(l);
   }
-  std::ranges::sort(yielding, {}, [&](std::size_t l) { return row_and_column(tree, links[l]); });
+  std::ranges::sort(yielding, {}, [&](std::uint32_t l) { return row_and_column(tree, links[l]); });
   return yielding;
 }
 
@@ -191,11 +191,12 @@ void close_leaves(const LinkTree& tree, std::span<Link> links, std::span<const d
   for (const LinkNode& node : tree.nodes()) {
     if (node.is_leaf()) area[tree.leaf_patch(node)] = node.area;
   }
-  const std::vector<std::size_t> yielding = yielding_links(tree, links);
+  const std::vector<std::uint32_t> yielding = yielding_links(tree, links);
   ExchangeRows rows(sum.size());
-  for (const std::size_t l : yielding) {
+  for (const std::uint32_t l : yielding) {
     const auto [i, j] = row_and_column(tree, links[l]);
-    const double most = links[l].unoccluded_area, part = links[l].variance / (most * most);
+    const double most = links[l].unoccluded_area,
+                 part = links[l].of_patches().variance / (most * most);
     rows[i].push_back(
         {j, links[l].exchange_area, links[l].unoccluded_area, static_cast<float>(part)});
   }
@@ -208,7 +209,7 @@ void close_leaves(const LinkTree& tree, std::span<Link> links, std::span<const d
   }
   enforce_closure(rows, area, wanted_of_rows);
   std::vector<std::size_t> next(rows.size(), 0);
-  for (const std::size_t l : yielding) {
+  for (const std::uint32_t l : yielding) {
     const std::uint32_t i = row_and_column(tree, links[l]).first;
     links[l].exchange_area = rows[i][next[i]++].exchange_area;
   }
@@ -220,7 +221,7 @@ void divide(const LinkTree& tree, std::span<const double> factor, std::span<Link
     const double f = factor[tree.leaf_patch(tree[leaf])];
     return f > 0 ? f : 1;
   };
-  for (Link& link : links) link.exchange_area /= static_cast<float>(of(link.a) * of(link.b));
+  for (Link& link : links) link.exchange_area /= static_cast<float>(of(link.a()) * of(link.b()));
 }
 
 /// The squared change of the exchange by factors, and its squared norm, Frobenius.
@@ -242,9 +243,9 @@ struct Change {
       }
     }
     for (const Link& link : links) {
-      const double pairs = static_cast<double>(nodes[link.a].count) * nodes[link.b].count;
+      const double pairs = static_cast<double>(nodes[link.a()].count) * nodes[link.b()].count;
       const double squared = static_cast<double>(link.exchange_area) * link.exchange_area / pairs;
-      const double part = mean[link.a] * mean[link.b] - 1;
+      const double part = mean[link.a()] * mean[link.b()] - 1;
       change += squared * part * part;
       norm += squared;
     }
@@ -262,8 +263,7 @@ LinkScaling scale_links(const LinkTree& tree, std::span<Link> links,
                         std::span<const RowSumTarget> target) {
   LinkScaling result;
   std::vector<double>&factor = result.factor, &row = result.row_sum;
-  const auto middle = std::partition(links.begin(), links.end(),
-                                     [&](const Link& link) { return is_certain(tree, link); });
+  const auto middle = std::partition(links.begin(), links.end(), is_certain);
   const auto certain_count = static_cast<std::size_t>(middle - links.begin());
   const std::span certain = links.first(certain_count), rest = links.subspan(certain_count);
   row = gather_links(tree, links, std::vector<double>(target.size(), 1.0));

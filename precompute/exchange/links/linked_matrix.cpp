@@ -62,7 +62,7 @@ class LinkedMatrix::Filler {
     for (std::uint32_t k = 0; k < patches.size(); ++k) {
       const std::uint32_t p = patches[k];
       result.push_back({matrix_.position_[p], k, table.centroid[p],
-                        matrix_.tree_.scale[p] * std::sqrt(table.area[p])});
+                        matrix_.links_->nodes().scale[p] * std::sqrt(table.area[p])});
     }
     std::ranges::sort(result, {}, &Member::position);
     return result;
@@ -89,7 +89,7 @@ class LinkedMatrix::Filler {
       follow_some(std::span<const IncomingLink>{begin, end}, node, near);
       begin = end;
     }
-    const std::uint32_t child = matrix_.tree_.first_child[node];
+    const std::uint32_t child = matrix_.links_->nodes().first_child[node];
     if (child == kNone) return;
     const std::uint32_t second = matrix_.nodes_[child + 1].begin;
     const auto split = std::ranges::lower_bound(near, second, {}, &Member::position) - near.begin();
@@ -138,29 +138,28 @@ class LinkedMatrix::Filler {
   Index near_stride_, far_stride_;
 };
 
-LinkedMatrix::LinkedMatrix(const FormFactorLinks& tree,
-                           std::shared_ptr<const LinkedFormFactors> links,
+LinkedMatrix::LinkedMatrix(std::shared_ptr<const LinkedFormFactors> links,
                            const PatchTable& patches)
-    : tree_(tree), patches_(patches), links_(std::move(links)), position_(patches.size()) {
+    : patches_(patches), links_(std::move(links)), position_(patches.size()) {
   const std::size_t n = patches.size();
-  if (links_->patch_count() != n || tree.patch.size() != n || patches.centroid.size() != n) {
+  if (links_->patch_count() != n || patches.centroid.size() != n) {
     throw Error("links: they are for another number of patches");
   }
-  for (std::uint32_t k = 0; k < n; ++k) position_[tree.patch[k]] = k;
+  for (std::uint32_t k = 0; k < n; ++k) position_[links_->nodes().patch[k]] = k;
   measure_nodes();
 }
 
 void LinkedMatrix::measure_nodes() {
-  const std::size_t m = tree_.first_child.size();
-  const std::vector<std::uint32_t> begin = first_positions(tree_);
+  const LinkedNodes& tree = links_->nodes();
+  const std::size_t m = tree.first_child.size();
   nodes_.resize(m);
   std::vector<std::array<double, 3>> moment(m);
   for (std::size_t k = m; k-- > 0;) {
     Node& node = nodes_[k];
-    node.begin = begin[k];
-    node.count = tree_.count[k];
-    const std::uint32_t child = tree_.first_child[k];
-    const std::uint32_t patch = tree_.patch[node.begin];
+    node.begin = links_->first_positions()[k];
+    node.count = tree.count[k];
+    const std::uint32_t child = tree.first_child[k];
+    const std::uint32_t patch = tree.patch[node.begin];
     node.area = child == kNone ? patches_.area[patch] : nodes_[child].area + nodes_[child + 1].area;
     for (int axis = 0; axis < 3; ++axis) {
       moment[k][axis] = child == kNone ? node.area * patches_.centroid[patch][axis]
@@ -183,17 +182,19 @@ void LinkedMatrix::entries(std::uint32_t /*matrix*/, std::span<const std::uint32
 
 template <typename Columns>
 void LinkedMatrix::multiply_some(const Eigen::MatrixXf& x, Index begin,
-                                 Eigen::MatrixXf& result) const {
+                                 Workspace<Columns>& workspace, Eigen::MatrixXf& result) const {
   const std::size_t n = patches_.size();
   const Index count = std::min<Index>(std::tuple_size_v<Columns>, x.cols() - begin);
-  std::vector<Columns> in(n), out(n);
+  auto& [in, out, links] = workspace;
+  in.resize(n);
+  out.resize(n);
 #pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < n; ++i) {
     for (Index c = 0; c < count; ++c) {
       in[i][c] = x(static_cast<Index>(i), begin + c) / std::sqrt(patches_.area[i]);
     }
   }
-  links_->gather(std::span<const Columns>(in), std::span(out));
+  links_->gather(std::span<const Columns>(in), std::span(out), links);
 #pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < n; ++i) {
     for (Index c = 0; c < count; ++c) {
@@ -206,10 +207,10 @@ Eigen::MatrixXf LinkedMatrix::multiply(std::uint32_t /*matrix*/, const Eigen::Ma
   constexpr Index kMany = 24;
   Eigen::MatrixXf result(x.rows(), x.cols());
   Index begin = 0;
-  for (; x.cols() - begin > kChannelCount; begin += kMany) {
-    multiply_some<std::array<float, kMany>>(x, begin, result);
-  }
-  for (; begin < x.cols(); begin += kChannelCount) multiply_some<Float3>(x, begin, result);
+  Workspace<std::array<float, kMany>> many;
+  for (; x.cols() - begin > kChannelCount; begin += kMany) multiply_some(x, begin, many, result);
+  Workspace<Float3> few;
+  for (; begin < x.cols(); begin += kChannelCount) multiply_some(x, begin, few, result);
   return result;
 }
 

@@ -16,10 +16,8 @@ namespace rebounce {
 /// link at most.
 class LinkedMatrix final : public SymmetricMatrix {
  public:
-  /// `tree` is that of `links`; its own links are not read. It and the patches must outlive the
-  /// object. Throws Error if the links are not of these patches.
-  LinkedMatrix(const FormFactorLinks& tree, std::shared_ptr<const LinkedFormFactors> links,
-               const PatchTable& patches);
+  /// The patches must outlive the object. Throws Error if the links are not of these patches.
+  LinkedMatrix(std::shared_ptr<const LinkedFormFactors> links, const PatchTable& patches);
 
   std::span<const float> area() const override { return patches_.area; }
   void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
@@ -37,12 +35,17 @@ class LinkedMatrix final : public SymmetricMatrix {
 
   void measure_nodes();
 
+  template <typename Columns>
+  struct Workspace {
+    std::vector<Columns> in, out, links;
+  };
+
   /// Writes the products with `Columns`::size() columns of `x` from `begin` on, or as many as are
   /// left.
   template <typename Columns>
-  void multiply_some(const Eigen::MatrixXf& x, Eigen::Index begin, Eigen::MatrixXf& result) const;
+  void multiply_some(const Eigen::MatrixXf& x, Eigen::Index begin, Workspace<Columns>& workspace,
+                     Eigen::MatrixXf& result) const;
 
-  const FormFactorLinks& tree_;
   const PatchTable& patches_;
   std::shared_ptr<const LinkedFormFactors> links_;
   std::vector<std::uint32_t> position_;  ///< [n] position of each patch

@@ -1,8 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <span>
 #include <vector>
 
 #include "precompute/base/progress.h"
@@ -18,7 +18,8 @@
 namespace rebounce {
 
 struct LinkBuild : EscapedLight {
-  FormFactorLinks links;
+  std::shared_ptr<const LinkedFormFactors> form_factors;
+  std::size_t link_count = 0;
   ClosureReport closure;
   std::uint64_t ray_count = 0;        ///< including the rays that measure what escapes
   std::uint64_t candidate_count = 0;  ///< pairs of nodes that were examined
@@ -38,41 +39,23 @@ class LinkBuilder {
   LinkBuilder(const LinkBuilder&) = delete;
   LinkBuilder& operator=(const LinkBuilder&) = delete;
 
-  /// Finds the links for `epsilon`, in place of settings.link_epsilon, and returns their number.
-  /// When called again, links that are near enough stay, so that it takes a part of the time.
-  /// Throws Error if epsilon is not above 0 or not below the last one, Cancelled if `progress` asks
-  /// to stop.
-  std::size_t find(double epsilon, const Progress& progress = {});
-
-  /// The links that were found last.
-  LinkBuild result() const;
-
-  /// The same after find().
-  LinkBuild build(double epsilon, const Progress& progress = {}) {
-    find(epsilon, progress);
-    return result();
-  }
-
-  /// What result() has, without a copy of the links.
-  const EscapedLight& escaped() const { return escaped_; }
-  std::shared_ptr<const LinkedFormFactors> form_factors() const;
+  /// Finds the links for `epsilon`, in place of settings.link_epsilon; those that exchange no light
+  /// are left out. When called again, links that are near enough stay, so that it takes a part of
+  /// the time. Throws Error if epsilon is not above 0 or not below the last one, Cancelled if
+  /// `progress` asks to stop.
+  LinkBuild build(double epsilon, const Progress& progress = {});
 
   /// Memory that is kept for finer links.
   std::uint64_t held_bytes() const { return links_.held_bytes(); }
 
  private:
-  FormFactorLinks tree() const;
-  std::size_t link_count() const;
+  LinkedNodes nodes(const std::vector<double>& factor) const;
 
   const PatchModel& model_;
   const PatchGeometry geometry_;
   const ShadowRays shadow_rays_;
   RefinedLinks links_;
-  // Of the last links:
-  double epsilon_ = 0;
-  std::vector<double> factor_;  ///< [n] of each patch
-  ClosureReport closure_;
-  EscapedLight escaped_;
+  double epsilon_ = 0;  ///< of the last links
 };
 
 }  // namespace rebounce

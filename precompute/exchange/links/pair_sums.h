@@ -59,10 +59,9 @@ class SortedPairs final : public PairSource {
 /// The pairs that links stand for, computed on demand.
 class LinkedPairs final : public PairSource {
  public:
-  /// `tree` is that of `links`; it and the patches must outlive the object.
-  LinkedPairs(const FormFactorLinks& tree, std::shared_ptr<const LinkedFormFactors> links,
-              const PatchTable& patches)
-      : matrix_(tree, std::move(links), patches), patches_(patches), patch_(tree.patch) {}
+  /// The patches must outlive the object.
+  LinkedPairs(const std::shared_ptr<const LinkedFormFactors>& links, const PatchTable& patches)
+      : matrix_(links, patches), patches_(patches), patch_(links->nodes().patch) {}
 
   void block(PositionRange rows, PositionRange columns, std::span<float> exchange) const override;
 

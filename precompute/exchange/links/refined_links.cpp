@@ -57,7 +57,8 @@ RefinedLinks::RefinedLinks(const PatchModel& model, const ShadowRays& shadow_ray
 
 void RefinedLinks::refine(double epsilon, const Progress& progress) {
   for (Link& link : links()) {
-    if (link.measured_area >= 0) link.exchange_area = link.measured_area;
+    const float measured = link.of_patches().measured_area;
+    if (measured >= 0) link.exchange_area = measured;
   }
   refinement_.refine(epsilon, part_of(progress, 0.0, 0.4));
   if (target_.empty()) {

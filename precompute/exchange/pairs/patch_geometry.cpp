@@ -73,19 +73,18 @@ PatchBounds bounds_of(std::span<const FlatTriangle> triangles) {
 }
 
 PatchPart whole_of(std::span<const FlatTriangle> triangles) {
-  PatchPart part;
+  double area = 0, radius = 0;
+  glm::dvec3 centroid(0), vector_area(0);
   for (const FlatTriangle& t : triangles) {
-    part.area += t.stopping_area();
-    part.centroid += t.stopping_area() * t.centroid;
-    part.vector_area += t.stopping_area() * t.normal;
+    area += t.stopping_area();
+    centroid += t.stopping_area() * t.centroid;
+    vector_area += t.stopping_area() * t.normal;
   }
-  part.centroid /= part.area;
+  centroid /= area;
   for (const FlatTriangle& t : triangles) {
-    for (const glm::dvec3& v : t.vertex) {
-      part.radius = std::max(part.radius, glm::distance(v, part.centroid));
-    }
+    for (const glm::dvec3& v : t.vertex) radius = std::max(radius, glm::distance(v, centroid));
   }
-  return part;
+  return {centroid, vector_area, static_cast<float>(area), static_cast<float>(radius)};
 }
 
 bool is_about_flat(const PatchPart& part) {
@@ -171,9 +170,10 @@ class PartWriter {
 double between_parts(std::span<const PatchPart> a, std::span<const PatchPart> b) {
   double sum = 0;
   for (const PatchPart& x : a) {
+    const glm::dvec3 from(x.centroid), area(x.vector_area);
     double inner = 0;
     for (const PatchPart& y : b) {
-      inner += point_kernel(x.centroid, x.vector_area, y.centroid, y.vector_area);
+      inner += point_kernel(from, area, glm::dvec3(y.centroid), glm::dvec3(y.vector_area));
     }
     sum += inner;
   }
@@ -193,15 +193,15 @@ double between_triangles(std::span<const FlatTriangle> a, std::span<const FlatTr
 
 /// The exchange of a part with a triangle per area of the part, which faces `normal`.
 double part_to_triangle(const PatchPart& part, const glm::dvec3& normal, const FlatTriangle& t) {
-  const glm::dvec3 d = part.centroid - t.centroid;
+  const glm::dvec3 centroid(part.centroid), d = centroid - t.centroid;
   const double height = glm::dot(t.normal, d);
   if (height <= 1e-6 * t.radius) return 0;
   if (t.radius * t.radius < kPointLike * kPointLike * glm::dot(d, d)) {
-    return t.stopping_area() * point_kernel(part.centroid, normal, t.centroid, t.normal);
+    return t.stopping_area() * point_kernel(centroid, normal, t.centroid, t.normal);
   }
   // Coordinates are relative to the part, so that single precision is enough.
-  const std::array<glm::vec3, 3> corner = {t.vertex[0] - part.centroid, t.vertex[1] - part.centroid,
-                                           t.vertex[2] - part.centroid};
+  const std::array<glm::vec3, 3> corner = {t.vertex[0] - centroid, t.vertex[1] - centroid,
+                                           t.vertex[2] - centroid};
   return t.stopping_part * point_to_polygon_form_factor({0, 0, 0}, normal, corner);
 }
 
@@ -212,15 +212,16 @@ double parts_to_patch(const PatchGeometry& geometry, std::size_t i, std::size_t 
   const std::span<const PatchPart> to = geometry.parts(j, kFinest);
   double sum = 0;
   for (const PatchPart& from : geometry.parts(i, kFinest)) {
-    const double seen_area = glm::length(from.vector_area);
+    const glm::dvec3 centroid(from.centroid), vector_area(from.vector_area);
+    const double seen_area = glm::length(vector_area);
     if (seen_area <= 0) continue;
-    const glm::dvec3 normal = from.vector_area / seen_area;
+    const glm::dvec3 normal = vector_area / seen_area;
     double inner = 0;
     for (std::size_t k = 0; k < to.size(); ++k) {
       const double reach = kNearPart * (from.radius + to[k].radius);
-      const glm::dvec3 d = to[k].centroid - from.centroid;
+      const glm::dvec3 there(to[k].centroid), d = there - centroid;
       if (glm::dot(d, d) > reach * reach) {
-        inner += point_kernel(from.centroid, normal, to[k].centroid, to[k].vector_area);
+        inner += point_kernel(centroid, normal, there, glm::dvec3(to[k].vector_area));
         continue;
       }
       for (const FlatTriangle& t : geometry.fragments(j, k)) {

@@ -31,12 +31,13 @@ struct PatchBounds {
 };
 
 /// A part of a patch taken as a point. Its area counts as projected: the normals of a part that is
-/// not flat cancel in part, as its projections do.
+/// not flat cancel in part, as its projections do. There are 63 parts of each patch, so numbers are
+/// of single precision.
 struct PatchPart {
-  glm::dvec3 centroid{0};
-  glm::dvec3 vector_area{0};  ///< m²: the sum of area x normal
-  double area = 0;            ///< m², of the surface that stops light
-  double radius = 0;          ///< of the sphere around the centroid, metres
+  glm::vec3 centroid{0};
+  glm::vec3 vector_area{0};  ///< m²: the sum of area x normal
+  float area = 0;            ///< m², of the surface that stops light
+  float radius = 0;          ///< of the sphere around the centroid, metres
 };
 
 /// The shapes of all patches. Immutable, usable from any number of threads.

@@ -178,8 +178,8 @@ TEST(BuildFromLinks, WhatRowsLeaveOfOneEscapes) {
     const PatchTable& patches = data.patches;
     const LinkedFormFactors links(data.links, patches.area, patches.centroid);
     const std::vector<std::array<double, 3>> ones(patches.size(), {1, 1, 1});
-    std::vector<std::array<double, 3>> sum(patches.size());
-    links.gather(std::span(ones), std::span(sum));
+    std::vector<std::array<double, 3>> sum(patches.size()), workspace;
+    links.gather(std::span(ones), std::span(sum), workspace);
     for (std::size_t i = 0; i < patches.size(); ++i) {
       const double all = sum[i][0] + patches.sky_visibility[i] + patches.absorbed[i];
       EXPECT_NEAR(all, 1, kClosure) << scene << " " << i;

@@ -28,14 +28,11 @@ constexpr double kFormFactorTolerance = 0.01, kSolveResidual = 1e-2;
 class CorrectedSolverOfRoom : public testing::Test {
  protected:
   CorrectedSolverOfRoom() : model_(make_patch_model(scene(), {.patch_count = 400})) {
-    const FormFactorLinks links =
-        LinkBuilder(model_, test::make_tracer(model_), {}).build(kLinkEpsilon).links;
-    links_ = std::make_shared<const LinkedFormFactors>(links, patches().area, patches().centroid);
+    links_ = LinkBuilder(model_, test::make_tracer(model_), {}).build(kLinkEpsilon).form_factors;
     const Lights radiosities = lights(48, 1);
-    form_factors_ =
-        compress_form_factors(links, links_, patches(),
-                              {std::span(radiosities).first(32), std::span(radiosities).last(16)},
-                              {kFormFactorTolerance});
+    form_factors_ = compress_form_factors(
+        links_, patches(), {std::span(radiosities).first(32), std::span(radiosities).last(16)},
+        {kFormFactorTolerance});
     solved_.emplace(*form_factors_, patches(), kSolveResidual);
   }
 

@@ -133,14 +133,14 @@ TEST(ReferenceSolution, LightsTogetherAreThoseAlone) {
 TEST(ReferenceSolution, SolvesOnLinksInDoublePrecision) {
   const Float3 reflectance = {0.9F, 0.5F, 0.1F};
   PatchModel model = make_patch_model(test::room_with_block(reflectance), {.patch_count = 300});
-  const FormFactorLinks links =
-      LinkBuilder(model, test::make_tracer(model), {}).build(kLinkEpsilon).links;
+  const auto links =
+      LinkBuilder(model, test::make_tracer(model), {}).build(kLinkEpsilon).form_factors;
   const PatchTable& patches = model.patches;
-  const LinkedFormFactors form_factors(links, patches.area, patches.centroid);
   const std::vector<Float3> light(patches.size(), Float3{1, 2, 3});
   const auto b = ReferenceSolver(links, patches).radiosity(light, 1e-12);
   std::vector<Double3> h(b.size());
-  form_factors.gather(std::span<const Double3>(b), std::span(h));
+  std::vector<Double3> workspace;
+  links->gather(std::span<const Double3>(b), std::span(h), workspace);
   double left = 0, all = 0;
   for (std::size_t i = 0; i < b.size(); ++i) {
     for (int c = 0; c < kChannelCount; ++c) {

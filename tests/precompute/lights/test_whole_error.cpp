@@ -43,7 +43,7 @@ class WholeErrorOfRoom : public testing::Test {
     tracer_.emplace(test::make_tracer(model));
     FormFactorSettings settings;
     FormFactors pairs = compute_form_factors(model, *tracer_, settings);
-    const FormFactorLinks links = LinkBuilder(model, *tracer_, settings).build(kCoarseLinks).links;
+    const auto links = LinkBuilder(model, *tracer_, settings).build(kCoarseLinks).form_factors;
     shown_patch_ = model.shown_patch;
     data_ = test::data_of(std::move(model), pairs);
     reference_.emplace(links, data_.patches);

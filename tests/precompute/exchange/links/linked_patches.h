@@ -18,7 +18,7 @@ inline std::shared_ptr<const LinkedFormFactors> gathering(const FormFactorLinks&
 /// As few links as are enough for the pairs that `links` stand for.
 inline FormFactorLinks fewer_links(const FormFactorLinks& links, const PatchTable& patches,
                                    double error_per_link = kErrorPerLink) {
-  return fit_links(links, gathering(links, patches), patches, error_per_link);
+  return fit_links(gathering(links, patches), patches, error_per_link);
 }
 
 }  // namespace rebounce::test

@@ -73,10 +73,9 @@ double error_of(const Pairs& pairs, const FormFactorLinks& links) {
 
 /// As refinement found them by rays, fewer.
 FormFactorLinks traced(const Pairs& pairs) {
-  const PatchTable& patches = pairs.patches();
-  const FormFactorLinks links =
-      LinkBuilder(pairs.model, test::make_tracer(pairs.model), {}).build(kLinkEpsilon).links;
-  return test::fewer_links(links, patches);
+  const RayTracer tracer = test::make_tracer(pairs.model);
+  return fit_links(LinkBuilder(pairs.model, tracer, {}).build(kLinkEpsilon).form_factors,
+                   pairs.patches());
 }
 
 TEST(LinkFitting, WorthNextToNothingLinksAreThePairs) {

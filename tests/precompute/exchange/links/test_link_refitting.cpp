@@ -133,8 +133,8 @@ TEST(LinkRefitting, KeepsWhatPatchesExchangeWithThemselves) {
 /// Two closed rooms with a wall of 10 cm between them, and links of the pairs in each.
 struct TwoRooms {
   PatchModel model = make_patch_model(scene(), {.patch_count = 600});
-  FormFactorLinks links =
-      LinkBuilder(model, test::make_tracer(model), {}).build(kLinkEpsilon).links;
+  FormFactorLinks links = flat_links(
+      *LinkBuilder(model, test::make_tracer(model), {}).build(kLinkEpsilon).form_factors);
 
   static Scene scene() {
     Scene scene = test::empty_scene();
@@ -192,7 +192,7 @@ TEST(LinkRefitting, RefusesWhatDoesNotFit) {
   walls.patches.area.pop_back();
   walls.patches.centroid.pop_back();
   test::expect_error([&] { test::fewer_links(walls.links, walls.patches); }, "patch");
-  test::expect_error([&] { fit_links(walls.links, gathering, walls.patches); }, "patch");
+  test::expect_error([&] { fit_links(gathering, walls.patches); }, "patch");
 }
 
 }  // namespace

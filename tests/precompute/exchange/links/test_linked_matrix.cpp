@@ -22,10 +22,9 @@ namespace {
 struct LinkedRoom {
   PatchModel model =
       make_patch_model(test::room_with_block({0.6F, 0.5F, 0.4F}), {.patch_count = 400});
-  FormFactorLinks links =
-      LinkBuilder(model, test::make_tracer(model), {}).build(kLinkEpsilon).links;
-  std::shared_ptr<const LinkedFormFactors> gathering = test::gathering(links, model.patches);
+  LinkBuild build = LinkBuilder(model, test::make_tracer(model), {}).build(kLinkEpsilon);
 
+  const std::shared_ptr<const LinkedFormFactors>& links() const { return build.form_factors; }
   const PatchTable& patches() const { return model.patches; }
 };
 
@@ -42,7 +41,7 @@ Eigen::MatrixXf gathered() {
   for (std::size_t j = 0; j < n; ++j) {
     std::vector<Float3> unit(n);
     unit[j][0] = 1 / std::sqrt(patches.area[j]);
-    const std::vector<Float3> column = gather(*room().gathering, unit);
+    const std::vector<Float3> column = gather(*room().links(), unit);
     for (std::size_t i = 0; i < n; ++i) g(i, j) = column[i][0] * std::sqrt(patches.area[i]);
   }
   return g;
@@ -57,10 +56,10 @@ std::vector<std::uint32_t> some_patches(std::size_t begin, std::size_t count) {
 }
 
 TEST(LinkedMatrix, EntriesAreThoseThatUnitVectorsGather) {
-  ASSERT_LT(room().links.pair.size(), room().patches().size() * room().patches().size() / 4)
+  ASSERT_LT(room().build.link_count, room().patches().size() * room().patches().size() / 4)
       << "links that stand for single pairs would test little";
   const Eigen::MatrixXf truth = gathered();
-  const LinkedMatrix matrix(room().links, room().gathering, room().patches());
+  const LinkedMatrix matrix(room().links(), room().patches());
   const std::array lists = {some_patches(0, 250), some_patches(250, 40), some_patches(300, 90)};
   for (const auto& [rows, columns] : {std::pair(lists[0], lists[1]), std::pair(lists[1], lists[2]),
                                       std::pair(lists[0], lists[0])}) {
@@ -78,14 +77,14 @@ TEST(LinkedMatrix, EntriesAreThoseThatUnitVectorsGather) {
 
 TEST(LinkedMatrix, ProductsAreThoseOfItsEntries) {
   const Eigen::MatrixXf truth = gathered();
-  const LinkedMatrix matrix(room().links, room().gathering, room().patches());
+  const LinkedMatrix matrix(room().links(), room().patches());
   const Eigen::MatrixXf x = Eigen::MatrixXf::Random(truth.cols(), 7);
   EXPECT_LT((matrix.multiply(0, x) - truth * x).norm(), 1e-5F * (truth * x).norm());
 }
 
 TEST(LinkedMatrix, EnergiesAreThoseOfItsColumns) {
   const Eigen::MatrixXf truth = gathered();
-  const LinkedMatrix matrix(room().links, room().gathering, room().patches());
+  const LinkedMatrix matrix(room().links(), room().patches());
   const auto order = some_patches(0, room().patches().size());
   const Eigen::VectorXd energies = matrix.energies(order);
   const Eigen::VectorXd exact = truth.cast<double>().colwise().squaredNorm();
@@ -108,11 +107,11 @@ TEST(LinkedMatrix, IsCompressedToATolerance) {
     }
   }
   const std::span all(lights);
-  const auto compressed = compress_form_factors(room().links, room().gathering, room().patches(),
+  const auto compressed = compress_form_factors(room().links(), room().patches(),
                                                 {all.first(32), all.subspan(32, 16)}, {kTolerance});
   double error = 0;
   for (const auto& light : all.last(16)) {
-    error += relative_difference(product(*compressed, light), gather(*room().gathering, light),
+    error += relative_difference(product(*compressed, light), gather(*room().links(), light),
                                  room().patches().area) /
              16;
   }
@@ -124,8 +123,7 @@ TEST(LinkedMatrix, RefusesLinksOfOtherPatches) {
   PatchTable fewer = room().patches();
   fewer.area.pop_back();
   fewer.centroid.pop_back();
-  test::expect_error([&] { LinkedMatrix(room().links, room().gathering, fewer); },
-                     "another number of patches");
+  test::expect_error([&] { LinkedMatrix(room().links(), fewer); }, "another number of patches");
 }
 
 }  // namespace

@@ -55,10 +55,6 @@ const Furnished& furnished() {
   return room;
 }
 
-LinkedFormFactors operator_of(const LinkBuild& build, const PatchTable& patches) {
-  return {build.links, patches.area, patches.centroid};
-}
-
 /// Light that changes smoothly from place to place.
 std::vector<Float3> smooth_light(const PatchTable& patches) {
   std::vector<Float3> light;
@@ -71,17 +67,17 @@ std::vector<Float3> smooth_light(const PatchTable& patches) {
 TEST(Links, CarryTheEnergyOfThePairs) {
   const auto& [model, build, pairs] = furnished();
   const std::vector<Float3> ones(model.patches.size(), {1, 1, 1});
-  const std::vector<Float3> arrived = gather(operator_of(build, model.patches), ones);
+  const std::vector<Float3> arrived = gather(*build.form_factors, ones);
   double by_links = 0, by_pairs = 0;
   for (std::size_t i = 0; i < ones.size(); ++i) by_links += model.patches.area[i] * arrived[i][0];
   for (const float s : pairs.exchange.exchange_area) by_pairs += 2 * s;
   EXPECT_NEAR(by_links / by_pairs, 1, 2e-3);
-  EXPECT_LT(build.links.pair.size(), pairs.exchange.column.size() / 2);
+  EXPECT_LT(build.link_count, pairs.exchange.column.size() / 2);
 }
 
 TEST(Links, AreReciprocal) {
   const PatchModel& model = furnished().model;
-  const LinkedFormFactors links = operator_of(furnished().build, model.patches);
+  const LinkedFormFactors& links = *furnished().build.form_factors;
   std::mt19937 engine(7);
   std::uniform_real_distribution<float> uniform(0, 1);
   const auto random = [&] {
@@ -101,7 +97,7 @@ TEST(Links, AreReciprocal) {
 
 TEST(Links, FurnaceInAClosedBox) {
   const PatchModel model = model_of(empty_room());
-  const LinkedFormFactors links = operator_of(links_of(model), model.patches);
+  const LinkedFormFactors links = *links_of(model).form_factors;
   HierarchicalSolver solver(links, {model.patches.area, model.patches.reflectance});
   const std::vector<Float3> emitted(model.patches.size(), {1, 1, 1});
   const SolveResult result = solver.solve(emitted);
@@ -111,7 +107,7 @@ TEST(Links, FurnaceInAClosedBox) {
 
 TEST(Links, GatherAndSolveLikeAllPairs) {
   const PatchModel& model = furnished().model;
-  const LinkedFormFactors links = operator_of(furnished().build, model.patches);
+  const LinkedFormFactors& links = *furnished().build.form_factors;
   const FormFactorBlocks pairs(furnished().pairs.exchange, model.patches.area);
   const std::vector<Float3> light = smooth_light(model.patches);
   EXPECT_LT(relative_difference(gather(links, light), gather(pairs, light), model.patches.area),
@@ -134,7 +130,7 @@ TEST(Links, GatherAndSolveLikeAllPairs) {
 TEST(Links, BetweenSinglePatchesAreAsExactAsPairs) {
   const PatchModel model = model_of(test::furnished_room(), 200);
   const LinkBuild build = links_of(model, 1e-6);
-  const FormFactorLinks& links = build.links;
+  const FormFactorLinks links = flat_links(*build.form_factors);
   const auto single = [&](const std::array<std::uint32_t, 2>& pair) {
     return links.count[pair[0]] == 1 && links.count[pair[1]] == 1;
   };
@@ -143,8 +139,8 @@ TEST(Links, BetweenSinglePatchesAreAsExactAsPairs) {
   // The same rays; closure alone differs.
   const FormFactorBlocks pairs(form_factors_of(model).exchange, model.patches.area);
   const std::vector<Float3> light = smooth_light(model.patches);
-  EXPECT_LT(relative_difference(gather(operator_of(build, model.patches), light),
-                                gather(pairs, light), model.patches.area),
+  EXPECT_LT(relative_difference(gather(*build.form_factors, light), gather(pairs, light),
+                                model.patches.area),
             1e-3);
 }
 
@@ -156,8 +152,8 @@ TEST(Links, SmallerErrorsAreSmaller) {
   double last_error = 1;
   for (const double epsilon : {3e-2, 3e-3, 3e-4}) {
     const LinkBuild build = links_of(model, epsilon);
-    const double error = relative_difference(gather(operator_of(build, model.patches), light),
-                                             truth, model.patches.area);
+    const double error =
+        relative_difference(gather(*build.form_factors, light), truth, model.patches.area);
     EXPECT_LT(error, last_error) << epsilon;
     last_error = error;
   }
@@ -170,15 +166,12 @@ TEST(Links, AreMadeFinerFromCoarserOnes) {
   LinkBuilder builder(model, tracer, {});
   const LinkBuild coarse = builder.build(1e-3);
   const LinkBuild finer = builder.build(2e-4), alone = links_of(model, 2e-4);
-  const auto count = [](const LinkBuild& build) {
-    return static_cast<double>(build.links.pair.size());
-  };
+  const auto count = [](const LinkBuild& build) { return static_cast<double>(build.link_count); };
   // They differ where rows that the coarse links doubted are examined with all rays.
   EXPECT_NEAR(count(finer) / count(alone), 1, 0.05);
-  EXPECT_LT(
-      relative_difference(gather(operator_of(finer, model.patches), light),
-                          gather(operator_of(alone, model.patches), light), model.patches.area),
-      1e-3);
+  EXPECT_LT(relative_difference(gather(*finer.form_factors, light),
+                                gather(*alone.form_factors, light), model.patches.area),
+            1e-3);
   // Rays between single patches are most of all, and new links have new ones.
   EXPECT_LT(static_cast<double>(finer.ray_count - coarse.ray_count),
             0.6 * static_cast<double>(alone.ray_count));
@@ -186,30 +179,26 @@ TEST(Links, AreMadeFinerFromCoarserOnes) {
   const FormFactorBlocks pairs(furnished().pairs.exchange, model.patches.area);
   const std::vector<Float3> truth = gather(pairs, light);
   const auto error = [&](const LinkBuild& build) {
-    return relative_difference(gather(operator_of(build, model.patches), light), truth,
-                               model.patches.area);
+    return relative_difference(gather(*build.form_factors, light), truth, model.patches.area);
   };
   EXPECT_LT(error(finer), 0.7 * error(coarse));
   EXPECT_LT(error(finer), 1.1 * error(alone));
 }
 
-TEST(Links, GatherWithoutACopyOfTheirs) {
-  const PatchModel model = model_of(test::furnished_room(), 300);
-  const RayTracer tracer = test::make_tracer(model);
-  LinkBuilder builder(model, tracer, {});
-  const std::size_t count = builder.find(kLinkEpsilon);
-  const LinkBuild build = builder.result();
-  EXPECT_EQ(count, build.links.pair.size());
-  EXPECT_EQ(builder.escaped().sky_visibility, build.sky_visibility);
+TEST(Links, InFlatArraysGatherTheSame) {
+  const auto& [model, build, pairs] = furnished();
+  const FormFactorLinks links = flat_links(*build.form_factors);
+  EXPECT_EQ(links.pair.size(), build.link_count);
+  check_links(links, model.patches.size());
   const std::vector<Float3> light = smooth_light(model.patches);
-  EXPECT_EQ(gather(*builder.form_factors(), light),
-            gather(operator_of(build, model.patches), light));
+  EXPECT_EQ(gather(LinkedFormFactors(links, model.patches.area, model.patches.centroid), light),
+            gather(*build.form_factors, light));
 }
 
 TEST(Links, AreForecastFromASample) {
   // More pairs of nodes than the sample in most generations.
   const auto& [model, build, pairs] = furnished();
-  const double found = static_cast<double>(build.links.pair.size());
+  const double found = static_cast<double>(build.link_count);
   const auto forecast = static_cast<double>(
       forecast_link_count(model, test::make_tracer(model), {.link_epsilon = kLinkEpsilon}));
   RecordProperty("forecast", std::to_string(forecast / found));
@@ -221,7 +210,7 @@ TEST(Links, NothingGoesThroughAWall) {
   test::add_box(scene, {0, 0, 0}, {3, 3, 3}, true);
   test::add_box(scene, {3.1, 0, 0}, {6.1, 3, 3}, true);
   const PatchModel model = model_of(scene);
-  const LinkedFormFactors links = operator_of(links_of(model), model.patches);
+  const LinkedFormFactors links = *links_of(model).form_factors;
   std::vector<Float3> light(model.patches.size(), {0, 0, 0});
   for (std::size_t i = 0; i < light.size(); ++i) {
     if (model.patches.centroid[i][0] < 3.05F) light[i] = {1, 1, 1};
@@ -240,7 +229,7 @@ TEST(Links, PatchesThatSeeNothingExchangeNothing) {
   test::add_box(scene, {1, 0, 1}, {2.5, 1, 2.5}, false);  // its bottom does not show
   test::remove_face(scene, test::Face::kLowY, 1);
   const PatchModel model = model_of(scene);
-  const FormFactorLinks links = links_of(model).links;
+  const FormFactorLinks links = flat_links(*links_of(model).form_factors);
   const auto is_under_the_block = [&](std::size_t i) {
     const Float3& p = model.patches.centroid[i];
     return p[1] == 0 && p[0] > 1 && p[0] < 2.5F && p[2] > 1 && p[2] < 2.5F;
@@ -273,7 +262,7 @@ Scene rooms_with_a_door() {
 
 TEST(Links, WhatGoesThroughADoorDoes) {
   const PatchModel model = model_of(rooms_with_a_door(), 700);
-  const LinkedFormFactors links = operator_of(links_of(model), model.patches);
+  const LinkedFormFactors links = *links_of(model).form_factors;
   const FormFactorBlocks pairs(form_factors_of(model).exchange, model.patches.area);
   std::vector<Float3> light(model.patches.size(), {0, 0, 0});
   for (std::size_t i = 0; i < light.size(); ++i) {
@@ -308,8 +297,8 @@ TEST(Links, AreDimmedByGlass) {
   for (std::size_t i = 0; i < light.size(); ++i) {
     if (model.patches.centroid[i][0] < 1e-3F) light[i] = {1, 1, 1};
   }
-  EXPECT_LT(relative_difference(gather(operator_of(build, model.patches), light),
-                                gather(pairs, light), model.patches.area),
+  EXPECT_LT(relative_difference(gather(*build.form_factors, light), gather(pairs, light),
+                                model.patches.area),
             1e-2);
 }
 
@@ -325,14 +314,16 @@ TEST(Links, SameBitsForAnyNumberOfThreads) {
     LinkBuilder builder(model, tracer, {});
     builder.build(10 * kLinkEpsilon);
     Made made{builder.build(kLinkEpsilon), {}};
-    made.gathered = gather(operator_of(made.build, model.patches), light);
+    made.gathered = gather(*made.build.form_factors, light);
     return made;
   };
   const Made one = test::with_threads(1, make), three = test::with_threads(3, make);
-  EXPECT_EQ(one.build.links.pair, three.build.links.pair);
-  EXPECT_EQ(one.build.links.exchange_area, three.build.links.exchange_area);
-  EXPECT_EQ(one.build.links.gradient, three.build.links.gradient);
-  EXPECT_EQ(one.build.links.scale, three.build.links.scale);
+  const FormFactorLinks of_one = flat_links(*one.build.form_factors),
+                        of_three = flat_links(*three.build.form_factors);
+  EXPECT_EQ(of_one.pair, of_three.pair);
+  EXPECT_EQ(of_one.exchange_area, of_three.exchange_area);
+  EXPECT_EQ(of_one.gradient, of_three.gradient);
+  EXPECT_EQ(of_one.scale, of_three.scale);
   EXPECT_EQ(one.build.ray_count, three.build.ray_count);
   EXPECT_EQ(one.gathered, three.gathered);
 }
