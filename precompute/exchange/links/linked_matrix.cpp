@@ -185,7 +185,7 @@ void LinkedMatrix::multiply_some(const Eigen::MatrixXf& x, Index begin,
                                  Workspace<Columns>& workspace, Eigen::MatrixXf& result) const {
   const std::size_t n = patches_.size();
   const Index count = std::min<Index>(std::tuple_size_v<Columns>, x.cols() - begin);
-  auto& [in, out, links] = workspace;
+  std::vector<Columns>&in = workspace.in, &out = workspace.out;
   in.resize(n);
   out.resize(n);
 #pragma omp parallel for schedule(static)
@@ -194,7 +194,7 @@ void LinkedMatrix::multiply_some(const Eigen::MatrixXf& x, Index begin,
       in[i][c] = x(static_cast<Index>(i), begin + c) / std::sqrt(patches_.area[i]);
     }
   }
-  links_->gather(std::span<const Columns>(in), std::span(out), links);
+  links_->gather(std::span<const Columns>(in), std::span(out), workspace.links);
 #pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < n; ++i) {
     for (Index c = 0; c < count; ++c) {
