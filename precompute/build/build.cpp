@@ -177,7 +177,7 @@ class TransferBuild {
     if (decided_.operator_kind == OperatorKind::kNoOperator) {
       data_.links = flat_links(*std::exchange(links_, nullptr));
     }
-    return std::move(build);
+    return build;
   }
 
   /// Of the surfaces of the model, made once.

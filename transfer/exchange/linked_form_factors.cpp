@@ -430,11 +430,11 @@ void LinkedFormFactors::do_gather(std::span<const Float3> in, std::span<Float3> 
 template <typename Columns>
 void LinkedFormFactors::gather(std::span<const Columns> in, std::span<Columns> out,
                                std::vector<Columns>& workspace) const {
-  using Light = LinkLightOf<Columns>;
+  using NodeLight = LinkLightOf<Columns>;
   check_size("links: light", in.size(), patch_count());
   check_size("links: gathered light", out.size(), patch_count());
-  workspace.resize(2 * node_count() * (sizeof(Light) / sizeof(Columns)));
-  auto* light = reinterpret_cast<Light*>(workspace.data());
+  workspace.resize(2 * node_count() * (sizeof(NodeLight) / sizeof(Columns)));
+  auto* light = reinterpret_cast<NodeLight*>(workspace.data());
   tree_->gather(in, out, light, light + node_count(), fastest_gather<Columns>(), {});
 }
 
