@@ -140,8 +140,7 @@ def furnish(column, row, floor):
 
 
 def furnished_house():
-    gltf = document("Furnished house", (4.7, 1.6, 3.7), (1.8, 0.7, 1.2))
-    gltf.document["asset"]["generator"] = "make_house.py"
+    gltf = document("Furnished house", (4.7, 1.6, 3.7), (1.8, 0.7, 1.2), "make_house.py")
     materials = {
         "white": [0.8, 0.8, 0.78],
         "ochre": [0.7, 0.5, 0.25],

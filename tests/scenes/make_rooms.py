@@ -71,8 +71,8 @@ def looking(position, target):
     return [round(q, 6) for q in (cy * sp, sy * cp, -sy * sp, cy * cp)]
 
 
-def document(name, position, target):
-    gltf = GltfDocument("make_rooms.py", name)
+def document(name, position, target, generator="make_rooms.py"):
+    gltf = GltfDocument(generator, name)
     gltf.add_camera("view", position, CAMERA_FOV, looking(position, target), aspect_ratio=4 / 3)
     return gltf
 

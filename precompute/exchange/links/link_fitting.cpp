@@ -112,9 +112,9 @@ Totals totals_of(const ExchangeMatrix& exchange, const std::vector<float>& area)
   return totals;
 }
 
-/// The same from links; the norm leaves out what patches lose by their scales.
-Totals totals_of(const LinkedFormFactors& links, const PatchTable& patches) {
-  const std::vector<NodeSpread> nodes = spread_nodes(links.nodes(), patches.area, patches.centroid);
+/// The same from links, whose nodes have these spreads; the norm leaves out what patches lose by
+/// their scales.
+Totals totals_of(const LinkedFormFactors& links, std::span<const NodeSpread> nodes) {
   Totals totals{row_sums(links), 0};
   for (std::uint32_t node = 0; node < nodes.size(); ++node) {
     links.for_each_link(node, [&](const IncomingLink& link) {
@@ -196,7 +196,7 @@ FormFactorLinks fit_links(const std::shared_ptr<const LinkedFormFactors>& links,
   const LinkedPairs pairs(links, patches);
   // The fit reuses the tree of `links`: in another tree, links would be cut where its nodes end.
   const SpreadTree tree = spread_tree(tree_of(*links), patches, find_rooms(*links));
-  return fit(tree, pairs, totals_of(*links, patches), patches, error_per_link, progress);
+  return fit(tree, pairs, totals_of(*links, tree.spread), patches, error_per_link, progress);
 }
 
 }  // namespace rebounce
