@@ -22,6 +22,7 @@ ProcessorFeatures processor_features();
 /// The name of the kernels that OpenBLAS should use instead of `chosen`, its own choice; empty
 /// where its choice is good. OpenBLAS takes a processor that is newer than itself for one of 2004
 /// (Prescott). The kernels of that one are several times slower and read past the end of a vector.
+/// Or it takes the processor for one without AVX-512.
 std::string better_blas_kernels(std::string_view chosen, const ProcessorFeatures& features);
 
 }  // namespace rebounce

@@ -79,7 +79,6 @@ bool find_kept_links(const Checkpoint& checkpoint, const PatchTable& patches,
   links.limits = numbers[0].limits;
   build.form_factors =
       std::make_shared<const LinkedFormFactors>(flat, patches.area, patches.centroid);
-  build.link_count = flat.pair.size();
   build.closure = numbers[0].closure;
   build.ray_count = numbers[0].ray_count;
   build.candidate_count = numbers[0].candidate_count;

@@ -65,7 +65,8 @@ double finer_epsilon(double epsilon, double error, double tolerance) {
 std::uint64_t bytes_of_finer(const PatchModel& model, const PatchRoles& roles,
                              const BuildSettings& decided, const LinkBuilder& builder,
                              const LinkBuild& found, double step) {
-  const double finer = static_cast<double>(found.link_count) * std::pow(step, -kCountPower);
+  const double finer =
+      static_cast<double>(found.form_factors->link_count()) * std::pow(step, -kCountPower);
   const LinkedBuild build =
       linked_build(built_scene(model.patches.size(), model.mesh), static_cast<std::size_t>(finer),
                    builder.held_bytes() + found.form_factors->bytes(), model.patches.reflectance,
@@ -131,7 +132,7 @@ LinkBuild find_links(PatchModel& model, const RayTracer& tracer, const PatchRole
   const LinkBuild& build = links.build;
   report.ray_count = build.ray_count;
   report.pair_count = build.candidate_count;
-  report.link_count = build.link_count;
+  report.link_count = build.form_factors->link_count();
   report.closure = build.closure;
   return std::move(links.build);
 }

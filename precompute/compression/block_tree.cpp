@@ -3,10 +3,12 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "precompute/base/blas.h"
 #include "precompute/base/parallel_loop.h"
 #include "precompute/base/parallel_progress.h"
+#include "precompute/base/process_memory.h"
 #include "precompute/compression/block_compression.h"
 #include "precompute/compression/residual_ranks.h"
 
@@ -21,6 +23,9 @@ constexpr std::uint32_t kLargestPiece = 2048, kSmallestPiece = 512;
 // A block is smooth if its best ranks stay below this fraction of its sides. Splitting it would
 // only store the same few functions several times (lab/052).
 constexpr Index kSmoothPart = 16;
+
+// Values of parts that are copied before their memory is given back, a quarter of a GiB.
+constexpr std::size_t kValuesGivenBack = 1 << 26;
 
 void append_columns(const Eigen::MatrixXf& matrix, std::vector<float>& values) {
   values.insert(values.end(), matrix.data(), matrix.data() + matrix.size());
@@ -79,6 +84,18 @@ class PieceCompressor {
 
   Index matrix_count() const { return static_cast<Index>(matrices_.size()); }
 
+  /// Entries of a matrix in a block of the piece.
+  auto entries_of(const Eigen::MatrixXf& matrix, const TransferBlock& place) const {
+    return matrix.block(place.row_begin - row_begin_, place.column_begin - column_begin_,
+                        place.row_count, place.column_count);
+  }
+
+  bool is_zero(const TransferBlock& place) const {
+    return std::ranges::all_of(matrices_, [&](const Eigen::MatrixXf& matrix) {
+      return (entries_of(matrix, place).array() == 0).all();
+    });
+  }
+
   WideBlock wide_block(const TransferBlock& place) const {
     WideBlock block;
     block.matrix_count = matrix_count();
@@ -86,10 +103,7 @@ class PieceCompressor {
     block.entries.resize(place.row_count, matrix_count() * place.column_count);
     for (Index m = 0; m < matrix_count(); ++m) {
       block.entries.middleCols(m * place.column_count, place.column_count) =
-          matrices_[m]
-              .block(place.row_begin - row_begin_, place.column_begin - column_begin_,
-                     place.row_count, place.column_count)
-              .cast<double>();
+          entries_of(matrices_[m], place).cast<double>();
     }
     return block;
   }
@@ -120,11 +134,12 @@ class PieceCompressor {
                               .row_count = rows.count,
                               .column_begin = columns.begin,
                               .column_count = columns.count};
+    const double overhead = multiplier_ * sizes_.block;
+    if (is_zero(place)) return zero_part(place, overhead);
     const WideBlock block = weighted_block(place, row, column);
     const CompressionCost cost{
         .multiplier = multiplier_, .multiplicity = multiplicity(row, column), .sizes = sizes_};
     const double zero_cost = cost.total(block.entries.squaredNorm(), sizes_.block);
-    const double overhead = multiplier_ * sizes_.block;
     if (zero_cost <= 2 * overhead) return zero_part(place, zero_cost);
     const std::uint64_t seed = (std::uint64_t{rows.begin} << 32) + columns.begin + rows.count;
     const bool leaves = rows.is_leaf() && columns.is_leaf();
@@ -251,10 +266,31 @@ void add_pieces(const ClusterTree& tree, BlockPiece piece, std::uint32_t largest
 
 }  // namespace
 
-void BlockPart::append(BlockPart&& other) {
+void BlockPart::append(const BlockPart& other) {
   blocks.insert(blocks.end(), other.blocks.begin(), other.blocks.end());
   values.insert(values.end(), other.values.begin(), other.values.end());
   cost += other.cost;
+}
+
+BlockPart joined(std::vector<BlockPart> parts) {
+  if (parts.size() == 1) return std::move(parts.front());
+  std::size_t block_count = 0, value_count = HierarchicalFormat::kPadding;
+  for (const BlockPart& part : parts) {
+    block_count += part.blocks.size();
+    value_count += part.values.size();
+  }
+  BlockPart whole;
+  whole.blocks.reserve(block_count);
+  whole.values.reserve(value_count);
+  std::size_t ended = 0;
+  for (BlockPart& part : parts) {
+    whole.append(part);
+    ended += std::exchange(part, {}).values.size();
+    if (ended < kValuesGivenBack) continue;
+    return_freed_memory();
+    ended = 0;
+  }
+  return whole;
 }
 
 void share(const Ranks& ranks, std::span<BlockPart> parts) {
@@ -306,9 +342,7 @@ BlockPart BlockTreeCompressor::compress(std::span<const BlockPiece> pieces, doub
   });
   loop.finish();
   share(ranks, parts);
-  BlockPart whole;
-  for (BlockPart& part : parts) whole.append(std::move(part));
-  return whole;
+  return joined(std::move(parts));
 }
 
 HierarchicalStorage BlockTreeCompressor::assemble(BlockPart whole) const {

@@ -26,8 +26,12 @@ struct BlockPart {
   std::vector<float> values;
   double cost = 0;
 
-  void append(BlockPart&& other);
+  void append(const BlockPart& other);
 };
+
+/// The parts one after the other, with room for what assemble adds. Each ends once it is copied, so
+/// that they take little more memory than the whole.
+BlockPart joined(std::vector<BlockPart> parts);
 
 /// Gives all ranks the parts that each has made, part by part in turns.
 void share(const Ranks& ranks, std::span<BlockPart> parts);

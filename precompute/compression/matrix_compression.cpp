@@ -116,17 +116,17 @@ HierarchicalStorage MatrixCompression::at(double multiplier, const KeptParts& ke
   const std::vector<BlockPiece> pieces = compressor.pieces();
   const std::size_t together = kept.checkpoint.keeps() ? kKeptPieces : pieces.size();
   const auto all = static_cast<double>(pieces.size());
-  BlockPart whole;
+  std::vector<BlockPart> parts;
   for (std::size_t begin = 0; begin < pieces.size(); begin += together) {
     const std::size_t end = std::min(pieces.size(), begin + together);
     const auto some = std::span(pieces).subspan(begin, end - begin);
     const Progress part = part_of(progress, static_cast<double>(begin) / all, end / all);
-    whole.append(
+    parts.push_back(
         kept.checkpoint.find_or_make(fmt::format("{}_part_{:04}", kept.prefix, begin / together),
                                      [&] { return compressor.compress(some, multiplier, part); }));
     report_progress(part, 1);
   }
-  HierarchicalStorage storage = compressor.assemble(std::move(whole));
+  HierarchicalStorage storage = compressor.assemble(joined(std::move(parts)));
   if (nested_) {
     const CompressionCost cost{.multiplier = multiplier, .sizes = sizes_};
     const WantedBlocks wanted(frame_.roles, frame_.tree);

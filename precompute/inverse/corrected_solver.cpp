@@ -55,22 +55,23 @@ Lights CorrectedSolver::gather(const Lights& radiosities) const {
   const std::size_t n = patches_.size();
   const Ranks ranks;
   Lights gathered(radiosities.size());
-  std::vector<Columns> from(n), to(n), workspace;
+  GatheredLights<Columns> lights;
+  lights.in.resize(n);
   for (std::size_t begin = 0; begin < radiosities.size(); begin += kGathered) {
     if (!ranks.makes(begin, kGathered)) continue;
     const std::size_t count = std::min(kGathered, radiosities.size() - begin);
     for (std::size_t i = 0; i < n; ++i) {
-      from[i] = {};
+      lights.in[i] = {};
       for (std::size_t k = 0; k < count; ++k) {
-        std::ranges::copy(radiosities[begin + k][i], from[i].begin() + k * kChannelCount);
+        std::ranges::copy(radiosities[begin + k][i], lights.in[i].begin() + k * kChannelCount);
       }
     }
-    links_->gather(std::span<const Columns>(from), std::span(to), workspace);
+    links_->gather(lights);
     for (std::size_t k = 0; k < count; ++k) {
       std::vector<Float3>& light = gathered[begin + k];
       light.resize(n);
       for (std::size_t i = 0; i < n; ++i) {
-        std::copy_n(to[i].begin() + k * kChannelCount, kChannelCount, light[i].begin());
+        std::copy_n(lights.out[i].begin() + k * kChannelCount, kChannelCount, light[i].begin());
       }
     }
   }

@@ -90,12 +90,14 @@ void ReferenceLighting::leave_out_dark() {
 
 std::vector<double> ReferenceLighting::errors(const TransferOperator& transfer) const {
   std::vector<double> errors(lights_.size());
-  std::vector<std::vector<Float3>> results;
+  std::vector<std::vector<Float3>> results(std::min(kBatch, errors.size()),
+                                           std::vector<Float3>(area_.size()));
+  std::vector<float> workspace(transfer.workspace_size());
   for (std::size_t first = 0; first < errors.size(); first += kBatch) {
     const std::size_t count = std::min(kBatch, errors.size() - first);
-    results.clear();
-    for (std::size_t k = 0; k < count; ++k)
-      results.push_back(product(transfer, lights_[first + k]));
+    for (std::size_t k = 0; k < count; ++k) {
+      transfer.apply(lights_[first + k], results[k], workspace);
+    }
     parallel_for({}, count, [&](std::size_t k) {
       errors[first + k] =
           received_error(results[k], truths_[first + k], area_, received_.reference(first + k));

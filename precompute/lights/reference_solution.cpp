@@ -50,18 +50,17 @@ template <typename Scalar, int kRows>
 class LinkGatherer {
  public:
   void gather(const LinkedFormFactors& links, const Field<kRows>& in, Field<kRows>& out) {
-    from_.resize(in.cols());
-    to_.resize(in.cols());
-    Map(from_.front().data(), kRows, in.cols()) = in.template cast<Scalar>();
-    links.gather(std::span<const Columns>(from_), std::span(to_), workspace_);
-    out = Map(to_.front().data(), kRows, in.cols()).template cast<double>();
+    lights_.in.resize(in.cols());
+    Map(lights_.in.front().data(), kRows, in.cols()) = in.template cast<Scalar>();
+    links.gather(lights_);
+    out = Map(lights_.out.front().data(), kRows, in.cols()).template cast<double>();
   }
 
  private:
   using Columns = std::array<Scalar, kRows>;
   using Map = Eigen::Map<Eigen::Array<Scalar, kRows, Eigen::Dynamic>>;
 
-  std::vector<Columns> from_, to_, workspace_;
+  GatheredLights<Columns> lights_;
 };
 
 /// One light after the other, in single precision.
@@ -176,6 +175,7 @@ class ConjugateGradients {
       } else if (arithmetic == Arithmetic::kSingle) {
         single_.gather(*form, in, out);
       } else {
+        single_ = {};  // never again after double precision
         double_.gather(*form, in, out);
       }
     };

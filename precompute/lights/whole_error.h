@@ -51,9 +51,11 @@ class WholeErrorEstimator {
   void add(std::span<const Float3> initial_exitance, std::span<const Float3> truth,
            std::span<const Float3> result);
 
-  /// The errors over all lights; zeros without any. `shown_patch` [t] is that of PatchModel.
-  /// `transfer` is that of the links, or of an operator that is near; a hundredth does not matter.
-  /// No light may be added afterwards. Throws Cancelled if asked to stop.
+  /// The errors over all lights, relative to the light that arrives: what the links give or, where
+  /// that is more, what is missing less what they give. Zeros without any light. `shown_patch` [t]
+  /// is that of PatchModel. `transfer` is that of the links, or of an operator that is near; a
+  /// hundredth does not matter. No light may be added afterwards. Throws Cancelled if asked to
+  /// stop.
   WholeError estimate(std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
                       const IrradiancesOf& transfer, const Progress& progress = {});
 

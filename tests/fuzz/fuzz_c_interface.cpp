@@ -122,6 +122,7 @@ class Session {
   Session& operator=(const Session&) = delete;
   ~Session() {
     for (rebounce_transfer* transfer : transfers_) rebounce_transfer_release(transfer);
+    rebounce_transfer_release(whole_room_);
     for (rebounce_engine* engine : engines_) rebounce_engine_destroy(engine);
     for (rebounce_ies_profile* profile : profiles_) rebounce_ies_profile_destroy(profile);
     static volatile float kept;  // so that nothing is left out
@@ -169,16 +170,12 @@ class Session {
     rebounce_transfer_release(handle);
     const std::uint8_t choice = choices_.byte();
     if (choice < 224) {
-      handle = read_once();
+      if (whole_room_ == nullptr) whole_room_ = read_room(room().size());
+      handle = whole_room_;
       rebounce_transfer_retain(handle);
     } else {
       handle = read_room(choice < 240 ? room().size() : choices_.word() % room().size());
     }
-  }
-
-  static rebounce_transfer* read_once() {
-    static rebounce_transfer* const transfer = read_room(room().size());
-    return transfer;
   }
 
   static rebounce_transfer* read_room(std::size_t size) {
@@ -460,6 +457,7 @@ class Session {
   }
 
   Choices choices_;
+  rebounce_transfer* whole_room_ = nullptr;  ///< that the input reads first; each begins anew
   std::array<rebounce_transfer*, kHandles> transfers_{};
   std::array<rebounce_engine*, kHandles> engines_{};
   std::array<rebounce_ies_profile*, kHandles> profiles_{};

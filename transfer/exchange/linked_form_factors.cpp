@@ -164,6 +164,7 @@ class LinkedFormFactors::Tree {
   std::span<const std::uint32_t> first_positions() const { return first_position_; }
   std::size_t patch_count() const { return nodes_.patch.size(); }
   std::size_t node_count() const { return node_.size(); }
+  std::size_t link_count() const { return link_count_; }
   std::size_t bytes() const;
   std::span<const PlainLink> plain_links(std::size_t node) const {
     return std::span(plain_).subspan(plain_begin_[node],
@@ -182,12 +183,13 @@ class LinkedFormFactors::Tree {
 
  private:
   struct Node {
-    std::uint32_t first_child = kNone;
-    std::uint32_t patch = kNone;  ///< leaves only
     float area = 0;
     float part = 1;        ///< fraction of the parent's area
     Float3 from_parent{};  ///< centre minus the parent's centre, metres
   };
+
+  bool is_leaf(std::size_t node) const { return nodes_.first_child[node] == kNone; }
+  std::uint32_t leaf_patch(std::size_t node) const { return nodes_.patch[first_position_[node]]; }
 
   void build_tree(std::span<const float> area, std::span<const Float3> centroid);
   void place_children(std::span<const std::array<double, 4>> sum);
@@ -208,6 +210,7 @@ class LinkedFormFactors::Tree {
   std::vector<std::uint64_t> plain_begin_, affine_begin_;  ///< [m + 1]
   std::vector<PlainLink> plain_;
   std::vector<IncomingLink> affine_;
+  std::size_t link_count_ = 0;
 };
 
 LinkedFormFactors::Tree::Tree(LinkedNodes nodes, const GiveLinks& give, std::span<const float> area,
@@ -227,18 +230,15 @@ void LinkedFormFactors::Tree::build_tree(std::span<const float> area,
   node_.resize(m);
   std::vector<std::array<double, 4>> sum(m);  // area times centroid; area
   for (std::size_t k = m; k-- > 0;) {
-    Node& node = node_[k];
-    node.first_child = nodes_.first_child[k];
-    if (node.first_child == kNone) node.patch = nodes_.patch[first_position_[k]];
-    for (int axis = 0; axis < 4; ++axis) {
-      if (node.patch == kNone) {
-        sum[k][axis] = sum[node.first_child][axis] + sum[node.first_child + 1][axis];
-      } else {
-        const double a = area[node.patch];
-        sum[k][axis] = axis < 3 ? a * centroid[node.patch][axis] : a;
-      }
+    if (is_leaf(k)) {
+      const Float3& c = centroid[leaf_patch(k)];
+      const double a = area[leaf_patch(k)];
+      sum[k] = {a * c[0], a * c[1], a * c[2], a};
+    } else {
+      const std::uint32_t child = nodes_.first_child[k];
+      for (int axis = 0; axis < 4; ++axis) sum[k][axis] = sum[child][axis] + sum[child + 1][axis];
     }
-    node.area = static_cast<float>(sum[k][3]);
+    node_[k].area = static_cast<float>(sum[k][3]);
   }
   place_children(sum);
   find_levels();
@@ -248,8 +248,9 @@ void LinkedFormFactors::Tree::build_tree(std::span<const float> area,
 /// of each node, then the area.
 void LinkedFormFactors::Tree::place_children(std::span<const std::array<double, 4>> sum) {
   for (std::size_t k = 0; k < node_.size(); ++k) {
-    if (node_[k].patch != kNone) continue;
-    for (std::uint32_t c = node_[k].first_child; c < node_[k].first_child + 2; ++c) {
+    if (is_leaf(k)) continue;
+    const std::uint32_t child = nodes_.first_child[k];
+    for (std::uint32_t c = child; c < child + 2; ++c) {
       node_[c].part = static_cast<float>(sum[c][3] / sum[k][3]);
       for (int axis = 0; axis < 3; ++axis) {
         node_[c].from_parent[axis] =
@@ -266,7 +267,7 @@ void LinkedFormFactors::Tree::find_levels() {
     const std::uint32_t begin = level_begin_[level_begin_.size() - 2], end = level_begin_.back();
     std::uint32_t next_end = end;
     for (std::uint32_t k = begin; k < end; ++k) {
-      if (node_[k].patch == kNone) next_end += 2;
+      if (!is_leaf(k)) next_end += 2;
     }
     level_begin_.push_back(next_end);
   }
@@ -285,6 +286,7 @@ void LinkedFormFactors::Tree::sort_links(const GiveLinks& give) {
   for_each_incoming(give, [&](std::uint32_t node, const IncomingLink& link) {
     if (node >= m) refuse("a link joins a node that does not exist");
     ++place(node, gradients_of(link))[1];
+    if (node <= link.from) ++link_count_;
   });
   std::partial_sum(plain.begin(), plain.end(), plain.begin());
   std::partial_sum(affine.begin(), affine.end(), affine.begin());
@@ -308,7 +310,9 @@ void LinkedFormFactors::Tree::sort_links(const GiveLinks& give) {
 
 std::size_t LinkedFormFactors::Tree::bytes() const {
   return plain_.size() * sizeof(PlainLink) + affine_.size() * sizeof(IncomingLink) +
-         2 * plain_begin_.size() * sizeof(std::uint64_t) + 2 * node_.size() * sizeof(Node);
+         2 * plain_begin_.size() * sizeof(std::uint64_t) +
+         node_.size() * (sizeof(Node) + 3 * sizeof(std::uint32_t)) +
+         patch_count() * (sizeof(std::uint32_t) + sizeof(float));
 }
 
 template <typename Columns, typename Lanes>
@@ -333,13 +337,14 @@ void LinkedFormFactors::Tree::pull(std::span<const Columns> in, LinkLightOf<Lane
     const std::uint32_t begin = level_begin_[level], count = level_begin_[level + 1] - begin;
     parallel_for_pieces(scheduler, count, kNodesPerTask, [&](std::size_t of_level) {
       const std::size_t k = begin + of_level;
-      const Node& node = node_[k];
       LinkLightOf<Lanes> sum{};
-      if (node.patch != kNone) {
-        const Columns& x = in[node.patch];
-        for (std::size_t c = 0; c < x.size(); ++c) sum.mean[c] = nodes_.scale[node.patch] * x[c];
+      if (is_leaf(k)) {
+        const std::uint32_t patch = leaf_patch(k);
+        const Columns& x = in[patch];
+        for (std::size_t c = 0; c < x.size(); ++c) sum.mean[c] = nodes_.scale[patch] * x[c];
       } else {
-        for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
+        const std::uint32_t first = nodes_.first_child[k];
+        for (std::uint32_t c = first; c < first + 2; ++c) {
           const Node& child = node_[c];
           add_scaled(sum.mean, child.part, light[c].mean);
           for (int axis = 0; axis < 3; ++axis) {
@@ -360,16 +365,17 @@ void LinkedFormFactors::Tree::push(LinkLightOf<Lanes>* arrived, std::span<Column
     const std::uint32_t begin = level_begin_[level], count = level_begin_[level + 1] - begin;
     parallel_for_pieces(scheduler, count, kNodesPerTask, [&](std::size_t of_level) {
       const std::size_t k = begin + of_level;
-      const Node& node = node_[k];
       const LinkLightOf<Lanes>& here = arrived[k];
-      if (node.patch != kNone) {
-        const typename Lanes::value_type scale = nodes_.scale[node.patch],
-                                         factor = scale / node.area;
-        Columns& y = out[node.patch];
+      if (is_leaf(k)) {
+        const std::uint32_t patch = leaf_patch(k);
+        const typename Lanes::value_type scale = nodes_.scale[patch],
+                                         factor = scale / node_[k].area;
+        Columns& y = out[patch];
         for (std::size_t c = 0; c < y.size(); ++c) y[c] = factor * here.mean[c];
         return;
       }
-      for (std::uint32_t c = node.first_child; c < node.first_child + 2; ++c) {
+      const std::uint32_t first = nodes_.first_child[k];
+      for (std::uint32_t c = first; c < first + 2; ++c) {
         const Node& child = node_[c];
         add_scaled(arrived[c].mean, child.part, here.mean);
         for (int axis = 0; axis < 3; ++axis) {
@@ -395,6 +401,10 @@ std::size_t LinkedFormFactors::patch_count() const {
 
 std::size_t LinkedFormFactors::node_count() const {
   return tree_->node_count();
+}
+
+std::size_t LinkedFormFactors::link_count() const {
+  return tree_->link_count();
 }
 
 std::size_t LinkedFormFactors::bytes() const {
@@ -428,47 +438,36 @@ void LinkedFormFactors::do_gather(std::span<const Float3> in, std::span<Float3> 
 }
 
 template <typename Columns>
-void LinkedFormFactors::gather(std::span<const Columns> in, std::span<Columns> out,
-                               std::vector<Columns>& workspace) const {
+void LinkedFormFactors::gather(GatheredLights<Columns>& lights) const {
   using NodeLight = LinkLightOf<Columns>;
-  check_size("links: light", in.size(), patch_count());
-  check_size("links: gathered light", out.size(), patch_count());
-  workspace.resize(2 * node_count() * (sizeof(NodeLight) / sizeof(Columns)));
-  auto* light = reinterpret_cast<NodeLight*>(workspace.data());
-  tree_->gather(in, out, light, light + node_count(), fastest_gather<Columns>(), {});
+  check_size("links: light", lights.in.size(), patch_count());
+  lights.out.resize(patch_count());
+  lights.workspace.resize(2 * node_count() * (sizeof(NodeLight) / sizeof(Columns)));
+  auto* light = reinterpret_cast<NodeLight*>(lights.workspace.data());
+  tree_->gather(std::span<const Columns>(lights.in), std::span(lights.out), light,
+                light + node_count(), fastest_gather<Columns>(), {});
 }
 
-template void LinkedFormFactors::gather(std::span<const std::array<float, 3>>,
-                                        std::span<std::array<float, 3>>,
-                                        std::vector<std::array<float, 3>>&) const;
-template void LinkedFormFactors::gather(std::span<const ManyFloats>, std::span<ManyFloats>,
-                                        std::vector<ManyFloats>&) const;
-template void LinkedFormFactors::gather(std::span<const std::array<double, 3>>,
-                                        std::span<std::array<double, 3>>,
-                                        std::vector<std::array<double, 3>>&) const;
-template void LinkedFormFactors::gather(std::span<const ManyDoubles>, std::span<ManyDoubles>,
-                                        std::vector<ManyDoubles>&) const;
+template void LinkedFormFactors::gather(GatheredLights<std::array<float, 3>>&) const;
+template void LinkedFormFactors::gather(GatheredLights<ManyFloats>&) const;
+template void LinkedFormFactors::gather(GatheredLights<std::array<double, 3>>&) const;
+template void LinkedFormFactors::gather(GatheredLights<ManyDoubles>&) const;
 
 FormFactorLinks flat_links(const LinkedFormFactors& form_factors) {
   FormFactorLinks links{form_factors.nodes(), {}, {}, {}};
-  const auto for_each = [&](const auto& visit) {
-    for (std::uint32_t node = 0; node < form_factors.node_count(); ++node) {
-      form_factors.for_each_link(node, [&](const IncomingLink& link) {
-        if (node <= link.from) visit(node, link);
-      });
-    }
-  };
-  std::size_t count = 0;
-  for_each([&](std::uint32_t, const IncomingLink&) { ++count; });
+  const std::size_t count = form_factors.link_count();
   links.pair.reserve(count);
   links.exchange_area.reserve(count);
   links.gradient.reserve(count);
-  for_each([&](std::uint32_t node, const IncomingLink& link) {
-    const Float3 g = to_floats(link.gradient_to), h = to_floats(link.gradient_from);
-    links.pair.push_back({node, link.from});
-    links.exchange_area.push_back(link.exchange_area);
-    links.gradient.push_back({g[0], g[1], g[2], h[0], h[1], h[2]});
-  });
+  for (std::uint32_t node = 0; node < form_factors.node_count(); ++node) {
+    form_factors.for_each_link(node, [&](const IncomingLink& link) {
+      if (link.from < node) return;
+      const Float3 g = to_floats(link.gradient_to), h = to_floats(link.gradient_from);
+      links.pair.push_back({node, link.from});
+      links.exchange_area.push_back(link.exchange_area);
+      links.gradient.push_back({g[0], g[1], g[2], h[0], h[1], h[2]});
+    });
+  }
   return links;
 }
 

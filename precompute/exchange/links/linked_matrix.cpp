@@ -182,23 +182,21 @@ void LinkedMatrix::entries(std::uint32_t /*matrix*/, std::span<const std::uint32
 
 template <typename Columns>
 void LinkedMatrix::multiply_some(const Eigen::MatrixXf& x, Index begin,
-                                 Workspace<Columns>& workspace, Eigen::MatrixXf& result) const {
+                                 GatheredLights<Columns>& lights, Eigen::MatrixXf& result) const {
   const std::size_t n = patches_.size();
   const Index count = std::min<Index>(std::tuple_size_v<Columns>, x.cols() - begin);
-  std::vector<Columns>&in = workspace.in, &out = workspace.out;
-  in.resize(n);
-  out.resize(n);
+  lights.in.resize(n);
 #pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < n; ++i) {
     for (Index c = 0; c < count; ++c) {
-      in[i][c] = x(static_cast<Index>(i), begin + c) / std::sqrt(patches_.area[i]);
+      lights.in[i][c] = x(static_cast<Index>(i), begin + c) / std::sqrt(patches_.area[i]);
     }
   }
-  links_->gather(std::span<const Columns>(in), std::span(out), workspace.links);
+  links_->gather(lights);
 #pragma omp parallel for schedule(static)
   for (std::size_t i = 0; i < n; ++i) {
     for (Index c = 0; c < count; ++c) {
-      result(static_cast<Index>(i), begin + c) = out[i][c] * std::sqrt(patches_.area[i]);
+      result(static_cast<Index>(i), begin + c) = lights.out[i][c] * std::sqrt(patches_.area[i]);
     }
   }
 }
@@ -207,9 +205,9 @@ Eigen::MatrixXf LinkedMatrix::multiply(std::uint32_t /*matrix*/, const Eigen::Ma
   constexpr Index kMany = 24;
   Eigen::MatrixXf result(x.rows(), x.cols());
   Index begin = 0;
-  Workspace<std::array<float, kMany>> many;
+  GatheredLights<std::array<float, kMany>> many;
   for (; x.cols() - begin > kChannelCount; begin += kMany) multiply_some(x, begin, many, result);
-  Workspace<Float3> few;
+  GatheredLights<Float3> few;
   for (; begin < x.cols(); begin += kChannelCount) multiply_some(x, begin, few, result);
   return result;
 }

@@ -35,15 +35,10 @@ class LinkedMatrix final : public SymmetricMatrix {
 
   void measure_nodes();
 
-  template <typename Columns>
-  struct Workspace {
-    std::vector<Columns> in, out, links;
-  };
-
   /// Writes the products with `Columns`::size() columns of `x` from `begin` on, or as many as are
-  /// left.
+  /// left. `lights` are workspace.
   template <typename Columns>
-  void multiply_some(const Eigen::MatrixXf& x, Eigen::Index begin, Workspace<Columns>& workspace,
+  void multiply_some(const Eigen::MatrixXf& x, Eigen::Index begin, GatheredLights<Columns>& lights,
                      Eigen::MatrixXf& result) const;
 
   const PatchTable& patches_;

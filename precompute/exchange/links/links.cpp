@@ -1,6 +1,5 @@
 #include "precompute/exchange/links/links.h"
 
-#include <algorithm>
 #include <functional>
 
 #include "precompute/exchange/links/link_scaling.h"
@@ -58,7 +57,6 @@ LinkBuild LinkBuilder::build(double epsilon, const Progress& progress) {
   };
   build.form_factors = std::make_shared<const LinkedFormFactors>(
       nodes(scaling.factor), give, model_.patches.area, model_.patches.centroid);
-  build.link_count = static_cast<std::size_t>(std::ranges::count_if(links_.links(), exchanges));
   build.closure = scaling.closure;
   build.ray_count = links_.ray_count();
   build.candidate_count = links_.candidate_count();

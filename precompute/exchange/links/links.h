@@ -19,7 +19,6 @@ namespace rebounce {
 
 struct LinkBuild : EscapedLight {
   std::shared_ptr<const LinkedFormFactors> form_factors;
-  std::size_t link_count = 0;
   ClosureReport closure;
   std::uint64_t ray_count = 0;        ///< including the rays that measure what escapes
   std::uint64_t candidate_count = 0;  ///< pairs of nodes that were examined

@@ -36,9 +36,16 @@ TEST(BlasKernels, AreReplacedWhereTheProcessorIsUnknown) {
   EXPECT_EQ(better_blas_kernels("Prescott", {.avx2_and_fma = true}), "Haswell");
 }
 
+TEST(BlasKernels, AreReplacedWhereTheProcessorHasWiderVectors) {
+  for (const char* narrow : {"Haswell", "Zen"}) {
+    EXPECT_EQ(better_blas_kernels(narrow, {.avx2_and_fma = true, .avx512 = true}), "SkylakeX");
+    EXPECT_EQ(better_blas_kernels(narrow, {.avx2_and_fma = true}), "");
+  }
+}
+
 TEST(BlasKernels, AreKeptWhereTheyWillDo) {
   EXPECT_EQ(better_blas_kernels("Prescott", {}), "");
-  for (const char* known : {"Haswell", "Zen", "SkylakeX", "Cooperlake"}) {
+  for (const char* known : {"SkylakeX", "Cooperlake"}) {
     EXPECT_EQ(better_blas_kernels(known, {.avx2_and_fma = true, .avx512 = true}), "") << known;
   }
 }

@@ -177,11 +177,11 @@ TEST(BuildFromLinks, WhatRowsLeaveOfOneEscapes) {
     const ClosureReport& closure = of_links.report.closure;
     const PatchTable& patches = data.patches;
     const LinkedFormFactors links(data.links, patches.area, patches.centroid);
-    const std::vector<std::array<double, 3>> ones(patches.size(), {1, 1, 1});
-    std::vector<std::array<double, 3>> sum(patches.size()), workspace;
-    links.gather(std::span(ones), std::span(sum), workspace);
+    GatheredLights<std::array<double, 3>> ones;
+    ones.in.assign(patches.size(), {1, 1, 1});
+    links.gather(ones);
     for (std::size_t i = 0; i < patches.size(); ++i) {
-      const double all = sum[i][0] + patches.sky_visibility[i] + patches.absorbed[i];
+      const double all = ones.out[i][0] + patches.sky_visibility[i] + patches.absorbed[i];
       EXPECT_NEAR(all, 1, kClosure) << scene << " " << i;
       EXPECT_NEAR(patches.sky_visibility[i], pairs.patches.sky_visibility[i], 0.02) << i;
     }

@@ -87,7 +87,7 @@ TEST(LinkStage, MakesLinksFinerWhileTheyAreOffByTooMuch) {
   EXPECT_LE(found.phases("finer links"), 2);
   EXPECT_LT(found.decided.form_factors.link_epsilon, 0.7 * kCoarseLinks + 1e-12);
   EXPECT_GT(found.report.link_count, once.report.link_count);
-  EXPECT_EQ(found.report.link_count, found.build.link_count);
+  EXPECT_EQ(found.report.link_count, found.build.form_factors->link_count());
   EXPECT_GT(found.report.ray_count, once.report.ray_count) << "the rays of all rounds count";
   RecordProperty("error_once", std::to_string(error(once)));
   RecordProperty("error", std::to_string(error(found)));
@@ -109,7 +109,7 @@ TEST(LinkStage, LeavesLinksOfWhichFinerOnesDoNotFit) {
   const Found found(settings);
   EXPECT_EQ(found.phases("check of links"), 1);
   EXPECT_EQ(found.phases("finer links"), 0);
-  EXPECT_GT(found.build.link_count, 0);
+  EXPECT_GT(found.build.form_factors->link_count(), 0);
 }
 
 void expect_same(const FormFactorLinks& a, const FormFactorLinks& b) {

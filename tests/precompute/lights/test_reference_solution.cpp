@@ -137,10 +137,10 @@ TEST(ReferenceSolution, SolvesOnLinksInDoublePrecision) {
       LinkBuilder(model, test::make_tracer(model), {}).build(kLinkEpsilon).form_factors;
   const PatchTable& patches = model.patches;
   const std::vector<Float3> light(patches.size(), Float3{1, 2, 3});
-  const auto b = ReferenceSolver(links, patches).radiosity(light, 1e-12);
-  std::vector<Double3> h(b.size());
-  std::vector<Double3> workspace;
-  links->gather(std::span<const Double3>(b), std::span(h), workspace);
+  GatheredLights<Double3> gathered;
+  gathered.in = ReferenceSolver(links, patches).radiosity(light, 1e-12);
+  links->gather(gathered);
+  const std::vector<Double3>&b = gathered.in, &h = gathered.out;
   double left = 0, all = 0;
   for (std::size_t i = 0; i < b.size(); ++i) {
     for (int c = 0; c < kChannelCount; ++c) {

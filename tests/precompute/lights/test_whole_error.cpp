@@ -146,6 +146,20 @@ TEST_F(WholeErrorOfRoom, IsThatAtReceivers) {
   EXPECT_GT(said.whole.mean, estimate(of_links_, lossy()).whole.mean);
 }
 
+TEST_F(WholeErrorOfRoom, ALightThatLinksMissIsOffByAllOfIt) {
+  constexpr float kFound = 0.02F;
+  Irradiances missed = of_pairs_;
+  for (std::vector<Float3>& light : missed) {
+    for (Float3& irradiance : light) {
+      for (float& channel : irradiance) channel *= kFound;
+    }
+  }
+  const WholeError said = estimate(missed, missed);
+  const double found = kFound, missing = 1 - found;
+  EXPECT_NEAR(said.links.mean, missing / (missing - found), 2 * kErrorOfPairs);
+  EXPECT_NEAR(said.links.max, said.links.mean, 4 * kErrorOfPairs);
+}
+
 TEST_F(WholeErrorOfRoom, HasTheSameBitsForAnyThreadsAndStopsWhenAsked) {
   const auto made = [&] { return estimate(of_links_, lossy()); };
   const WholeError one = test::with_threads(1, made), three = test::with_threads(3, made);

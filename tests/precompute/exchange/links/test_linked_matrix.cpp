@@ -56,7 +56,8 @@ std::vector<std::uint32_t> some_patches(std::size_t begin, std::size_t count) {
 }
 
 TEST(LinkedMatrix, EntriesAreThoseThatUnitVectorsGather) {
-  ASSERT_LT(room().build.link_count, room().patches().size() * room().patches().size() / 4)
+  ASSERT_LT(room().build.form_factors->link_count(),
+            room().patches().size() * room().patches().size() / 4)
       << "links that stand for single pairs would test little";
   const Eigen::MatrixXf truth = gathered();
   const LinkedMatrix matrix(room().links(), room().patches());

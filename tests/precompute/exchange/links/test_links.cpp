@@ -72,7 +72,7 @@ TEST(Links, CarryTheEnergyOfThePairs) {
   for (std::size_t i = 0; i < ones.size(); ++i) by_links += model.patches.area[i] * arrived[i][0];
   for (const float s : pairs.exchange.exchange_area) by_pairs += 2 * s;
   EXPECT_NEAR(by_links / by_pairs, 1, 2e-3);
-  EXPECT_LT(build.link_count, pairs.exchange.column.size() / 2);
+  EXPECT_LT(build.form_factors->link_count(), pairs.exchange.column.size() / 2);
 }
 
 TEST(Links, AreReciprocal) {
@@ -166,7 +166,9 @@ TEST(Links, AreMadeFinerFromCoarserOnes) {
   LinkBuilder builder(model, tracer, {});
   const LinkBuild coarse = builder.build(1e-3);
   const LinkBuild finer = builder.build(2e-4), alone = links_of(model, 2e-4);
-  const auto count = [](const LinkBuild& build) { return static_cast<double>(build.link_count); };
+  const auto count = [](const LinkBuild& build) {
+    return static_cast<double>(build.form_factors->link_count());
+  };
   // They differ where rows that the coarse links doubted are examined with all rays.
   EXPECT_NEAR(count(finer) / count(alone), 1, 0.05);
   EXPECT_LT(relative_difference(gather(*finer.form_factors, light),
@@ -188,7 +190,7 @@ TEST(Links, AreMadeFinerFromCoarserOnes) {
 TEST(Links, InFlatArraysGatherTheSame) {
   const auto& [model, build, pairs] = furnished();
   const FormFactorLinks links = flat_links(*build.form_factors);
-  EXPECT_EQ(links.pair.size(), build.link_count);
+  EXPECT_EQ(links.pair.size(), build.form_factors->link_count());
   check_links(links, model.patches.size());
   const std::vector<Float3> light = smooth_light(model.patches);
   EXPECT_EQ(gather(LinkedFormFactors(links, model.patches.area, model.patches.centroid), light),
@@ -198,7 +200,7 @@ TEST(Links, InFlatArraysGatherTheSame) {
 TEST(Links, AreForecastFromASample) {
   // More pairs of nodes than the sample in most generations.
   const auto& [model, build, pairs] = furnished();
-  const double found = static_cast<double>(build.link_count);
+  const double found = static_cast<double>(build.form_factors->link_count());
   const auto forecast = static_cast<double>(
       forecast_link_count(model, test::make_tracer(model), {.link_epsilon = kLinkEpsilon}));
   RecordProperty("forecast", std::to_string(forecast / found));
