@@ -36,7 +36,7 @@ class ContenderBuilder {
     for (const double tolerance : settings_.tolerances) add_hierarchical(tolerance);
     add_dense();
     result_.forms = exact_forms(*result_.data);
-    const DrawnLights radiosities = radiosities_of(lights_, *result_.data);
+    const FittingLights radiosities = radiosities_of(lights_, *result_.data);
     const FormFactorMatrix matrix(result_.data->exchange, result_.data->patches.area);
     for (const double tolerance : settings_.tolerances) {
       add_compressed(tolerance, radiosities);
@@ -90,7 +90,7 @@ class ContenderBuilder {
   void add_hierarchical(double tolerance) {
     const std::string name = hierarchical_name(tolerance);
     const auto work = [&](const Progress& progress) {
-      return build_hierarchical_transfer(dense(), result_.data->patches, lights_.view(),
+      return build_hierarchical_transfer(dense(), result_.data->patches, lights_,
                                          {tolerance, kPrecision}, progress);
     };
     result_.operators.push_back({name, timed(name, work, bytes_of_operator)});
@@ -104,11 +104,11 @@ class ContenderBuilder {
     result_.operators.push_back({name, timed(name, work, bytes_of_operator)});
   }
 
-  void add_compressed(double tolerance, const DrawnLights& radiosities) {
+  void add_compressed(double tolerance, const FittingLights& radiosities) {
     const std::string name = compressed_name(tolerance);
     const auto work = [&](const Progress& progress) {
-      return compress_form_factors(result_.data->exchange, result_.data->patches,
-                                   radiosities.view(), {tolerance, kPrecision}, progress);
+      return compress_form_factors(result_.data->exchange, result_.data->patches, radiosities,
+                                   {tolerance, kPrecision}, progress);
     };
     const auto compressed = timed("form factors " + name, work, bytes_of_operator);
     if (tolerance == kDefaultTolerance) compressed_ = compressed;
@@ -116,7 +116,7 @@ class ContenderBuilder {
   }
 
   void add_shared(const FormFactorMatrix& matrix, double tolerance,
-                  const DrawnLights& radiosities) {
+                  const FittingLights& radiosities) {
     const std::string name = shared_name(tolerance);
     const auto work = [&](const Progress& progress) {
       return compress_to_tolerance(matrix, result_.data->patches, radiosities,
@@ -145,7 +145,7 @@ class ContenderBuilder {
   const ReportSettings& settings_;
   const ReportProgress& progress_;
   Contenders result_;
-  DrawnLights lights_;
+  FittingLights lights_;
   std::shared_ptr<const HierarchicalOperator> compressed_;  ///< at the default tolerance
 };
 

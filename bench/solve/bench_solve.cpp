@@ -33,12 +33,11 @@ std::vector<Form> forms_of(const TransferData& data, double tolerance) {
   if (data.compressed_form_factors) {
     forms.push_back(compressed_form("compressed", data.compressed_form_factors));
   } else if (!data.exchange.empty()) {
-    const DrawnLights lights = draw_fitting_lights(data, make_surface_tracer(data.mesh), 1);
-    const DrawnLights fitting = radiosities_of(lights, data);
-    forms.push_back(
-        compressed_form(compressed_name(tolerance),
-                        compress_form_factors(data.exchange, data.patches, fitting.view(),
-                                              {tolerance, Precision::kF16})));
+    const FittingLights lights = draw_fitting_lights(data, make_surface_tracer(data.mesh), 1);
+    forms.push_back(compressed_form(
+        compressed_name(tolerance),
+        compress_form_factors(data.exchange, data.patches, radiosities_of(lights, data),
+                              {tolerance, Precision::kF16})));
   }
   if (forms.empty()) throw Error("'" + scene_name(data) + "' holds no form factors");
   return forms;

@@ -15,6 +15,7 @@
 #include "precompute/lights/fitting_lights.h"
 #include "precompute/lights/measured_error.h"
 #include "precompute/lights/reference_solution.h"
+#include "precompute/lights/sparse_light.h"
 #include "precompute/lights/whole_error.h"
 #include "transfer/base/area_norm.h"
 
@@ -49,8 +50,13 @@ Lights radiosities_of(const ReferenceSolver& solver, Exitances exitances,
 
 /// The training, validation and test lights of the compressions.
 struct FittedLights {
-  DrawnLights exitances, radiosities;
+  FittingLights exitances, radiosities;
   Lights test_radiosities;
+};
+
+/// Lights that wait until an operator is fitted to them.
+struct WaitingLights {
+  std::vector<SparseLight> training, validation;
 };
 
 FittedLights find_lights(const RayTracer& tracer, const TransferData& data, const PatchRoles& roles,
@@ -78,7 +84,7 @@ FittedLights find_lights(const RayTracer& tracer, const TransferData& data, cons
 }
 
 /// The reference of errors at receivers, as a fraction of all light that patches reflect.
-double received_part(const DrawnLights& exitances, const DrawnLights& radiosities,
+double received_part(const FittingLights& exitances, const FittingLights& radiosities,
                      const PatchRoles& roles, std::span<const float> area) {
   ErrorReference received;
   for (std::size_t k = 0; k < exitances.training.size(); ++k) {
@@ -152,18 +158,19 @@ class LinkedOperator {
     });
     report_.form_factor_tolerance =
         form_factor_tolerance(decided_, lights_, roles_, data_.patches.area);
+    waiting_ = {sparse_lights(std::move(lights_.exitances.training)),
+                sparse_lights(std::move(lights_.exitances.validation))};
   }
 
   void compress_form_factors_of() {
     data_.compressed_form_factors =
         clock_.run("form factor compression", [&](const Progress& part) {
-          return compress_form_factors(links_, data_.patches, lights_.radiosities.view(),
+          return compress_form_factors(links_, data_.patches, std::move(lights_.radiosities),
                                        {report_.form_factor_tolerance, Precision::kF16}, part);
         });
     report_.form_factor_error = form_factor_error(*data_.compressed_form_factors, *links_,
                                                   data_.patches, lights_.test_radiosities);
-    lights_.radiosities = {};
-    lights_.test_radiosities = {};
+    lights_ = {};
   }
 
   void make_operator() {
@@ -179,9 +186,12 @@ class LinkedOperator {
         memory_of_matrix_free_transfer(build, decided_.memory_limit_bytes);
     settings.checkpoint = decided_.checkpoint;
     data_.transfer = clock_.run("operator", [&](const Progress& part) {
-      solved_.emplace(*data_.compressed_form_factors, data_.patches, lights_.exitances.view(),
-                      settings, part);
-      return solved_->compress(std::exchange(lights_.exitances, {}), tolerance(),
+      FittingLights lights{.training = expanded(waiting_.training), .validation = {}};
+      solved_.emplace(*data_.compressed_form_factors, data_.patches, lights.training, settings,
+                      part);
+      lights.validation = expanded(waiting_.validation);
+      waiting_ = {};
+      return solved_->compress(std::move(lights), tolerance(),
                                part_of(part, solved_->solving_part(), 1));
     });
     report_.solve_count = solved_->solve_count();
@@ -227,7 +237,8 @@ class LinkedOperator {
   TransferData& data_;
   BuildReport& report_;
   PhaseClock& clock_;
-  FittedLights lights_;
+  FittedLights lights_;  ///< while form factors are compressed
+  WaitingLights waiting_;
   std::optional<MatrixFreeTransfer> solved_;
   std::optional<CorrectedSolver> solver_;  ///< that the last check has used
   std::optional<WholeErrorEstimator> whole_;

@@ -34,9 +34,9 @@ std::shared_ptr<const TransferOperator> compress(const DenseOperator& dense,
   if (settings.operator_kind != OperatorKind::kHierarchical) {
     return build_low_rank_transfer(dense, {settings.rank, *settings.precision}, progress);
   }
-  const DrawnLights lights = draw_fitting_lights(data, tracer, settings.form_factors.seed, roles);
-  return build_hierarchical_transfer(dense, data.patches, lights.view(),
-                                     {settings.tolerance, *settings.precision}, progress, roles);
+  return build_hierarchical_transfer(
+      dense, data.patches, draw_fitting_lights(data, tracer, settings.form_factors.seed, roles),
+      {settings.tolerance, *settings.precision}, progress, roles);
 }
 
 /// Compresses the form factors of `data` and measures their error, with an operator of all patches.
@@ -46,11 +46,11 @@ void compress_form_factors_of(TransferData& data, const TransferOperator& transf
   const std::uint64_t seed = settings.form_factors.seed;
   report.form_factor_tolerance = settings.form_factor_tolerance;
   const std::vector<Float3>& reflectance = data.patches.reflectance;
-  const DrawnLights drawn = draw_fitting_lights(data, tracer, seed);
-  const DrawnLights fitting{radiosities_of(transfer, reflectance, drawn.training),
-                            radiosities_of(transfer, reflectance, drawn.validation)};
+  const FittingLights drawn = draw_fitting_lights(data, tracer, seed);
+  FittingLights fitting{radiosities_of(transfer, reflectance, drawn.training),
+                        radiosities_of(transfer, reflectance, drawn.validation)};
   data.compressed_form_factors =
-      compress_form_factors(data.exchange, data.patches, fitting.view(),
+      compress_form_factors(data.exchange, data.patches, std::move(fitting),
                             {settings.form_factor_tolerance, Precision::kF16}, progress);
   report.form_factor_error = form_factor_error(
       *data.compressed_form_factors, FormFactorRows(data.exchange, data.patches.area), data.patches,

@@ -10,23 +10,25 @@
 namespace rebounce {
 
 std::string identity_of_couplings(const HierarchicalOperator& form_factors,
-                                  const PatchTable& patches, const FittingLights& lights,
+                                  const PatchTable& patches,
+                                  std::span<const std::vector<Float3>> training,
                                   const PatchRoles& roles, std::span<const double> numbers) {
   Identity identity;
   const HierarchicalStorage& f = form_factors.storage();
   identity.add(numbers, f.blocks, f.values_f32.span(), f.values_f16.span(), f.bases_q8.span(),
                f.packed_couplings.span(), f.row_format, f.patch);
   identity.add(patches.area, patches.centroid, patches.normal, patches.reflectance, roles.role);
-  for (const std::vector<Float3>& light : lights.training) identity.add(light);
+  for (const std::vector<Float3>& light : training) identity.add(light);
   return identity.text();
 }
 
-std::string identity_of_rounds(const std::string& couplings, const FittingLights& lights,
+std::string identity_of_rounds(const std::string& couplings,
+                               std::span<const std::vector<Float3>> validation,
                                const HierarchicalSettings& settings) {
   Identity identity;
   identity.add(couplings, std::string_view(precision_name(settings.precision)),
                std::array{settings.tolerance}, std::array{settings.cluster_bases});
-  for (const std::vector<Float3>& light : lights.validation) identity.add(light);
+  for (const std::vector<Float3>& light : validation) identity.add(light);
   return identity.text();
 }
 

@@ -21,18 +21,17 @@ HierarchicalSettings without_cluster_bases(HierarchicalSettings settings) {
 }  // namespace
 
 std::shared_ptr<const HierarchicalOperator> compress_form_factors(
-    const ExchangeMatrix& exchange, const PatchTable& patches, const FittingLights& radiosities,
+    const ExchangeMatrix& exchange, const PatchTable& patches, FittingLights radiosities,
     const HierarchicalSettings& settings, const Progress& progress) {
   return compress_to_tolerance(FormFactorMatrix(exchange, patches.area), patches,
-                               copies_of(radiosities), without_cluster_bases(settings), progress);
+                               std::move(radiosities), without_cluster_bases(settings), progress);
 }
 
 std::shared_ptr<const HierarchicalOperator> compress_form_factors(
     std::shared_ptr<const LinkedFormFactors> links, const PatchTable& patches,
-    const FittingLights& radiosities, const HierarchicalSettings& settings,
-    const Progress& progress) {
+    FittingLights radiosities, const HierarchicalSettings& settings, const Progress& progress) {
   return compress_to_tolerance(LinkedMatrix(std::move(links), patches), patches,
-                               copies_of(radiosities), without_cluster_bases(settings), progress);
+                               std::move(radiosities), without_cluster_bases(settings), progress);
 }
 
 FormFactorError form_factor_error(const HierarchicalOperator& compressed,
@@ -70,7 +69,7 @@ std::vector<std::vector<Float3>> radiosities_of(
   return radiosities;
 }
 
-DrawnLights radiosities_of(const DrawnLights& lights, const TransferData& data) {
+FittingLights radiosities_of(const FittingLights& lights, const TransferData& data) {
   return {radiosities_of(*data.transfer, data.patches.reflectance, lights.training),
           radiosities_of(*data.transfer, data.patches.reflectance, lights.validation)};
 }

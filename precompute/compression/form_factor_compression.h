@@ -20,15 +20,14 @@ namespace rebounce {
 /// bounds the error of F B. If the tolerance is not reached, the result is the most exact operator
 /// that was found: measure it. Throws Cancelled if asked to stop.
 std::shared_ptr<const HierarchicalOperator> compress_form_factors(
-    const ExchangeMatrix& exchange, const PatchTable& patches, const FittingLights& radiosities,
+    const ExchangeMatrix& exchange, const PatchTable& patches, FittingLights radiosities,
     const HierarchicalSettings& settings, const Progress& progress = {});
 
 /// The same from links, without storing the pairs that they stand for. Each multiplier that is
 /// tried reads every entry once; the memory is that of a few pieces of the matrix.
 std::shared_ptr<const HierarchicalOperator> compress_form_factors(
     std::shared_ptr<const LinkedFormFactors> links, const PatchTable& patches,
-    const FittingLights& radiosities, const HierarchicalSettings& settings,
-    const Progress& progress = {});
+    FittingLights radiosities, const HierarchicalSettings& settings, const Progress& progress = {});
 
 /// Errors of the `compressed` form factors against `exact` ones, for these radiosities B.
 FormFactorError form_factor_error(const HierarchicalOperator& compressed,
@@ -42,6 +41,6 @@ std::vector<std::vector<Float3>> radiosities_of(
 
 /// The radiosities of fitting lights through data.transfer: the training and validation data of
 /// compress_form_factors.
-DrawnLights radiosities_of(const DrawnLights& lights, const TransferData& data);
+FittingLights radiosities_of(const FittingLights& lights, const TransferData& data);
 
 }  // namespace rebounce

@@ -14,9 +14,9 @@ HierarchicalStorage compress_transfer(const DenseOperator& dense, const PatchTab
 }
 
 std::shared_ptr<const HierarchicalOperator> build_hierarchical_transfer(
-    const DenseOperator& dense, const PatchTable& patches, const FittingLights& lights,
+    const DenseOperator& dense, const PatchTable& patches, FittingLights lights,
     const HierarchicalSettings& settings, const Progress& progress, const PatchRoles& roles) {
-  return compress_to_tolerance(DenseMatrix(dense, roles), patches, copies_of(lights), settings,
+  return compress_to_tolerance(DenseMatrix(dense, roles), patches, std::move(lights), settings,
                                progress);
 }
 

@@ -32,7 +32,7 @@ HierarchicalStorage compress_transfer(const DenseOperator& dense, const PatchTab
 /// is within the tolerance, the result is the most exact one: measure it. With `roles`, errors are
 /// those at receivers, for light of sources.
 std::shared_ptr<const HierarchicalOperator> build_hierarchical_transfer(
-    const DenseOperator& dense, const PatchTable& patches, const FittingLights& lights,
+    const DenseOperator& dense, const PatchTable& patches, FittingLights lights,
     const HierarchicalSettings& settings, const Progress& progress = {},
     const PatchRoles& roles = {});
 

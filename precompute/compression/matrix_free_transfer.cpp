@@ -42,10 +42,12 @@ double usual_vectors(std::size_t patch_count) {
   return 13 * std::pow(static_cast<double>(patch_count), 0.57);
 }
 
+using TrainingLights = std::span<const std::vector<Float3>>;
+
 /// Form factors as the steps of solves take them.
 HierarchicalStorage coarser(const HierarchicalOperator& form_factors, const PatchTable& patches,
-                            const FittingLights& lights, double tolerance) {
-  return compress_matrix(HierarchicalMatrix(form_factors.storage()), patches, lights.training,
+                            TrainingLights training, double tolerance) {
+  return compress_matrix(HierarchicalMatrix(form_factors.storage()), patches, training,
                          initial_multiplier(kCoarsePart * tolerance, patches.size()));
 }
 
@@ -63,15 +65,15 @@ MatrixFreeTransferPlan checked_plan(const PatchTable& patches,
 
 struct MatrixFreeTransfer::State {
   State(const HierarchicalOperator& form_factors, const PatchTable& of_patches,
-        const FittingLights& lights, MatrixFreeTransferSettings with)
+        TrainingLights training, MatrixFreeTransferSettings with)
       : settings(std::move(with)),
         patches(of_patches),
         plan(checked_plan(patches, settings)),
         limited(std::in_place, plan.thread_count),
         couplings_key(
-            identity_of_couplings(form_factors, patches, lights, settings.roles,
+            identity_of_couplings(form_factors, patches, training, settings.roles,
                                   {{kBasisPart, kResidualPart, kCoarsePart, tolerance()}})),
-        solved(form_factors, coarser(form_factors, patches, lights, tolerance()), patches,
+        solved(form_factors, coarser(form_factors, patches, training, tolerance()), patches,
                kResidualPart * tolerance()),
         matrix(solved, solved.estimated_energies(settings.roles), settings.roles) {
     limited.reset();
@@ -91,10 +93,10 @@ struct MatrixFreeTransfer::State {
 };
 
 MatrixFreeTransfer::MatrixFreeTransfer(const HierarchicalOperator& form_factors,
-                                       const PatchTable& patches, const FittingLights& lights,
+                                       const PatchTable& patches, TrainingLights training,
                                        const MatrixFreeTransferSettings& settings,
                                        const Progress& progress)
-    : state_(std::make_unique<State>(form_factors, patches, lights, settings)) {
+    : state_(std::make_unique<State>(form_factors, patches, training, settings)) {
   State& state = *state_;
   const ThreadLimit limited(state.plan.thread_count);
   const BlockCheckpoint checkpoint(settings.checkpoint, state.couplings_key);
@@ -102,7 +104,7 @@ MatrixFreeTransfer::MatrixFreeTransfer(const HierarchicalOperator& form_factors,
   const double usual =
       kBefore + state.solved.matrix_count() * usual_vectors(patches.size()) + kVectorsOfRounds;
   report_progress(progress, kVectorsBefore / usual);
-  const CompressionFrame frame = compression_frame(state.matrix, patches, lights.training);
+  const CompressionFrame frame = compression_frame(state.matrix, patches, training);
   const std::vector<std::uint32_t> cells = clusters_up_to(frame.tree, kBasisCell);
   SharedBases bases = sample_bases(state.solved, frame, cells, kBasisPart * state.tolerance(),
                                    part_of(progress, kVectorsBefore / usual, kBefore / usual));
@@ -132,7 +134,7 @@ double MatrixFreeTransfer::solving_part() const {
 }
 
 std::shared_ptr<const HierarchicalOperator> MatrixFreeTransfer::compress(
-    DrawnLights lights, double tolerance, const Progress& progress) const {
+    FittingLights lights, double tolerance, const Progress& progress) const {
   const State& state = *state_;
   HierarchicalSettings settings = state.settings.compression;
   settings.tolerance = tolerance;
@@ -140,18 +142,17 @@ std::shared_ptr<const HierarchicalOperator> MatrixFreeTransfer::compress(
   // Parts of a second search have the names of those of the first.
   std::filesystem::path folder = state.settings.checkpoint;
   if (!folder.empty() && tolerance != state.settings.compression.tolerance) folder /= "again";
-  const BlockCheckpoint rounds(folder,
-                               identity_of_rounds(state.couplings_key, lights.view(), settings));
+  const BlockCheckpoint rounds(
+      folder, identity_of_rounds(state.couplings_key, lights.validation, settings));
   return compress_to_tolerance(state.matrix, state.patches, std::move(lights), settings, progress,
                                rounds);
 }
 
 std::shared_ptr<const HierarchicalOperator> build_matrix_free_transfer(
-    const HierarchicalOperator& form_factors, const PatchTable& patches,
-    const FittingLights& lights, const MatrixFreeTransferSettings& settings,
-    const Progress& progress) {
-  const MatrixFreeTransfer transfer(form_factors, patches, lights, settings, progress);
-  return transfer.compress(copies_of(lights), settings.compression.tolerance,
+    const HierarchicalOperator& form_factors, const PatchTable& patches, FittingLights lights,
+    const MatrixFreeTransferSettings& settings, const Progress& progress) {
+  const MatrixFreeTransfer transfer(form_factors, patches, lights.training, settings, progress);
+  return transfer.compress(std::move(lights), settings.compression.tolerance,
                            part_of(progress, transfer.solving_part(), 1));
 }
 

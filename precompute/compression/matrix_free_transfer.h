@@ -1,6 +1,8 @@
 #pragma once
 
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "precompute/base/progress.h"
 #include "precompute/compression/matrix_free_plan.h"
@@ -22,13 +24,14 @@ namespace rebounce {
 /// contain it. The bits do not depend on the number of threads, the memory limit or the checkpoint.
 class MatrixFreeTransfer {
  public:
-  /// Solves for the matrix in its bases. All arguments but the lights must outlive the object.
+  /// Solves for the matrix in its bases. All arguments but the lights must outlive the object;
+  /// `training`: the training lights of FittingLights.
   /// Throws Error if the least memory is above the limit, which is known for certain once there are
   /// bases, if F is not a passive exchange (I - R G R
   /// not positive definite), or if the checkpoint cannot be written; Cancelled if asked to stop.
   MatrixFreeTransfer(const HierarchicalOperator& form_factors, const PatchTable& patches,
-                     const FittingLights& lights, const MatrixFreeTransferSettings& settings,
-                     const Progress& progress = {});
+                     std::span<const std::vector<Float3>> training,
+                     const MatrixFreeTransferSettings& settings, const Progress& progress = {});
   ~MatrixFreeTransfer();
   MatrixFreeTransfer(const MatrixFreeTransfer&) = delete;
   MatrixFreeTransfer& operator=(const MatrixFreeTransfer&) = delete;
@@ -36,7 +39,7 @@ class MatrixFreeTransfer {
   /// The operator of a `tolerance` that is that of the settings or, at the least, half of it. Below
   /// that of the settings the error may be a fifth larger than the tolerance, because the columns
   /// stay as exact as the settings ask. Throws likewise.
-  std::shared_ptr<const HierarchicalOperator> compress(DrawnLights lights, double tolerance,
+  std::shared_ptr<const HierarchicalOperator> compress(FittingLights lights, double tolerance,
                                                        const Progress& progress = {}) const;
 
   /// Products with the inverse of `form_factors`, as exact as the bases need.
@@ -56,8 +59,7 @@ class MatrixFreeTransfer {
 
 /// The operator of the tolerance of the settings.
 std::shared_ptr<const HierarchicalOperator> build_matrix_free_transfer(
-    const HierarchicalOperator& form_factors, const PatchTable& patches,
-    const FittingLights& lights, const MatrixFreeTransferSettings& settings,
-    const Progress& progress = {});
+    const HierarchicalOperator& form_factors, const PatchTable& patches, FittingLights lights,
+    const MatrixFreeTransferSettings& settings, const Progress& progress = {});
 
 }  // namespace rebounce

@@ -152,7 +152,7 @@ double initial_multiplier(double tolerance, std::size_t patch_count) {
 }
 
 std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
-    const SymmetricMatrix& matrix, const PatchTable& patches, DrawnLights lights,
+    const SymmetricMatrix& matrix, const PatchTable& patches, FittingLights lights,
     const HierarchicalSettings& settings, const Progress& progress,
     const BlockCheckpoint& checkpoint) {
   const ReferenceLighting validation = validation_truth(matrix, std::move(lights.validation));

@@ -19,7 +19,7 @@ double initial_multiplier(double tolerance, std::size_t patch_count);
 /// these arguments, keeps the results of each round; parts that it holds are reused. The bits are
 /// the same with and without it.
 std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
-    const SymmetricMatrix& matrix, const PatchTable& patches, DrawnLights lights,
+    const SymmetricMatrix& matrix, const PatchTable& patches, FittingLights lights,
     const HierarchicalSettings& settings, const Progress& progress = {},
     const BlockCheckpoint& checkpoint = {});
 

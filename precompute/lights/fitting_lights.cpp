@@ -41,11 +41,6 @@ std::vector<Float3> own_exitance(const TransferData& data, const RayTracer& trac
 
 }  // namespace
 
-DrawnLights copies_of(const FittingLights& lights) {
-  return {{lights.training.begin(), lights.training.end()},
-          {lights.validation.begin(), lights.validation.end()}};
-}
-
 std::vector<std::vector<Float3>> draw_training_lights(const TransferData& data,
                                                       const RayTracer& tracer, std::uint64_t seed,
                                                       const PatchRoles& roles) {
@@ -63,9 +58,9 @@ std::vector<std::vector<Float3>> draw_training_lights(const TransferData& data,
   return lights;
 }
 
-DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& tracer,
-                                std::uint64_t seed, const PatchRoles& roles) {
-  DrawnLights lights{draw_training_lights(data, tracer, seed, roles), {}};
+FittingLights draw_fitting_lights(const TransferData& data, const RayTracer& tracer,
+                                  std::uint64_t seed, const PatchRoles& roles) {
+  FittingLights lights{draw_training_lights(data, tracer, seed, roles), {}};
   lights.validation.push_back(lights.training.back());
   std::ranges::move(random_initial_exitances(data, tracer, LightKind::kPoint, kValidationPointCount,
                                              seed_of_draw(seed, kValidationDraw), roles),

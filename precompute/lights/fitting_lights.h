@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "rebounce/scene_data.h"
@@ -14,21 +13,11 @@ namespace rebounce {
 /// The lights that an operator is fitted to, each an initial exitance [n] in lx.
 struct FittingLights {
   /// Training lights. Errors under lights like these weigh more than others.
-  std::span<const std::vector<Float3>> training;
+  std::vector<std::vector<Float3>> training;
   /// Validation lights: the tolerance must hold for these. They differ from the training lights;
   /// otherwise the measured error is too small.
-  std::span<const std::vector<Float3>> validation;
+  std::vector<std::vector<Float3>> validation;
 };
-
-/// Lights drawn for fitting an operator, each an initial exitance [n] in lx.
-struct DrawnLights {
-  std::vector<std::vector<Float3>> training, validation;
-
-  /// Valid as long as the object lives and does not change.
-  FittingLights view() const { return {training, validation}; }
-};
-
-DrawnLights copies_of(const FittingLights& lights);
 
 /// The largest numbers of lights: those of an open scene with lamps of its own.
 inline constexpr std::size_t kMostTrainingLights = 193, kMostValidationLights = 513;
@@ -48,7 +37,7 @@ std::vector<std::vector<Float3>> draw_training_lights(const TransferData& data,
 
 /// Draws the same and validation lights, which are first the last of them, and then other point
 /// lights.
-DrawnLights draw_fitting_lights(const TransferData& data, const RayTracer& tracer,
-                                std::uint64_t seed, const PatchRoles& roles = {});
+FittingLights draw_fitting_lights(const TransferData& data, const RayTracer& tracer,
+                                  std::uint64_t seed, const PatchRoles& roles = {});
 
 }  // namespace rebounce

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "precompute/lights/random_lights.h"
@@ -51,12 +52,18 @@ std::vector<std::vector<Float3>> products(const SymmetricMatrix& matrix, Lights 
 
 ReferenceLighting::ReferenceLighting(const SymmetricMatrix& matrix,
                                      std::vector<std::vector<Float3>> lights)
-    : area_(matrix.area().begin(), matrix.area().end()), lights_(std::move(lights)) {
-  std::erase_if(lights_, [&](std::vector<Float3>& light) {
+    : area_(matrix.area().begin(), matrix.area().end()) {
+  std::erase_if(lights, [&](std::vector<Float3>& light) {
     matrix.roles().keep(PatchRoles::kSource, light);
     return !(area_norm(light, area_) > 0);
   });
-  truths_ = products(matrix, lights_);
+  lights_ = sparse_lights(std::move(lights));
+  truths_.reserve(lights_.size());
+  for (std::size_t begin = 0; begin < lights_.size(); begin += kBatch) {
+    const std::size_t count = std::min(kBatch, lights_.size() - begin);
+    std::ranges::move(products(matrix, expanded(std::span(lights_).subspan(begin, count))),
+                      std::back_inserter(truths_));
+  }
   leave_out_dark();
   keep_received(matrix.roles());
 }
@@ -78,13 +85,13 @@ void ReferenceLighting::keep_received(const PatchRoles& roles) {
 void ReferenceLighting::leave_out_dark() {
   std::size_t kept = 0;
   for (std::size_t k = 0; k < lights_.size(); ++k) {
-    if (arrives_nowhere(truths_[k], lights_[k], area_)) continue;
+    if (arrives_nowhere(truths_[k], lights_[k].expanded(), area_)) continue;
     std::swap(lights_[kept], lights_[k]);
     std::swap(truths_[kept], truths_[k]);
     ++kept;
   }
   if (kept == 0) return;  // the matrix is zero: light arrives nowhere
-  lights_.resize(kept);
+  lights_.erase(lights_.begin() + static_cast<std::ptrdiff_t>(kept), lights_.end());
   truths_.resize(kept);
 }
 
@@ -96,7 +103,7 @@ std::vector<double> ReferenceLighting::errors(const TransferOperator& transfer) 
   for (std::size_t first = 0; first < errors.size(); first += kBatch) {
     const std::size_t count = std::min(kBatch, errors.size() - first);
     for (std::size_t k = 0; k < count; ++k) {
-      transfer.apply(lights_[first + k], results[k], workspace);
+      transfer.apply(lights_[first + k].expanded(), results[k], workspace);
     }
     parallel_for({}, count, [&](std::size_t k) {
       errors[first + k] =
@@ -122,8 +129,9 @@ Eigen::VectorXd ReferenceLighting::normalised_light(std::size_t k,
   Eigen::VectorXd result = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(position_count));
   const double norm = received_.reference(k);
   if (norm == 0) return result;
+  const std::vector<Float3> light = lights_[k].expanded();
   for (std::size_t i = 0; i < patch.size(); ++i) {
-    const Float3& m0 = lights_[k][patch[i]];
+    const Float3& m0 = light[patch[i]];
     result[static_cast<Eigen::Index>(i)] =
         std::sqrt(area_[patch[i]]) * (m0[0] + m0[1] + m0[2]) / (kChannelCount * norm);
   }

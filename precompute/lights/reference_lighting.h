@@ -6,6 +6,7 @@
 
 #include "precompute/base/symmetric_matrix.h"
 #include "precompute/lights/error_reference.h"
+#include "precompute/lights/sparse_light.h"
 #include "transfer/operator/transfer_operator.h"
 
 namespace rebounce {
@@ -51,7 +52,8 @@ class ReferenceLighting {
   void leave_out_dark();
 
   std::vector<float> area_;
-  std::vector<std::vector<Float3>> lights_, truths_;
+  std::vector<SparseLight> lights_;
+  std::vector<std::vector<Float3>> truths_;
   ErrorReference received_;
 };
 

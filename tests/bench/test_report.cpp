@@ -90,7 +90,7 @@ class QuickReport : public testing::Test {
   static std::shared_ptr<const HierarchicalOperator> compressed_operator(double tolerance) {
     const auto lights = draw_fitting_lights(*data_, make_surface_tracer(data_->mesh), 1);
     return build_hierarchical_transfer(static_cast<const DenseOperator&>(*data_->transfer),
-                                       data_->patches, lights.view(), {tolerance, Precision::kQ8});
+                                       data_->patches, lights, {tolerance, Precision::kQ8});
   }
 
   static std::vector<Float3> multiply(const TransferOperator& transfer,

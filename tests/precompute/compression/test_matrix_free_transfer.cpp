@@ -263,11 +263,11 @@ TEST(MatrixFreeTransfer, KeepsTheToleranceAsCompressionOfTheDenseInverseDoes) {
 
 TEST(MatrixFreeTransfer, IsCompressedAgainFinerFromTheSameBases) {
   const GreyRoom& room = small_room();
-  const MatrixFreeTransfer columns(*room.form_factors, room.patches, room.lights(),
+  const MatrixFreeTransfer columns(*room.form_factors, room.patches, room.training,
                                    {.compression = kCoarse});
-  expect_same(*columns.compress(copies_of(room.lights()), kCoarse.tolerance), uninterrupted());
+  expect_same(*columns.compress(room.lights(), kCoarse.tolerance), uninterrupted());
   const double tolerance = 0.6 * kCoarse.tolerance;
-  const auto finer = columns.compress(copies_of(room.lights()), tolerance);
+  const auto finer = columns.compress(room.lights(), tolerance);
   const auto dense = build_dense_transfer(room.exchange, room.patches, Precision::kF32);
   const auto error = [&](const HierarchicalOperator& compressed) {
     return test::mean_error(compressed, *dense, room.patches.area, lights_in(room.patches, 24, 3));

@@ -29,16 +29,19 @@ class CorrectedSolverOfRoom : public testing::Test {
  protected:
   CorrectedSolverOfRoom() : model_(make_patch_model(scene(), {.patch_count = 400})) {
     links_ = LinkBuilder(model_, test::make_tracer(model_), {}).build(kLinkEpsilon).form_factors;
-    const Lights radiosities = lights(48, 1);
-    form_factors_ = compress_form_factors(
-        links_, patches(), {std::span(radiosities).first(32), std::span(radiosities).last(16)},
-        {kFormFactorTolerance});
+    form_factors_ =
+        compress_form_factors(links_, patches(), fitting_lights(1), {kFormFactorTolerance});
     solved_.emplace(*form_factors_, patches(), kSolveResidual);
   }
 
   static Scene scene() { return test::room_with_block({0.8F, 0.6F, 0.6F}); }
 
   const PatchTable& patches() const { return model_.patches; }
+
+  FittingLights fitting_lights(std::uint32_t seed) const {
+    const Lights some = lights(48, seed);
+    return {{some.begin(), some.begin() + 32}, {some.begin() + 32, some.end()}};
+  }
 
   /// Lights on some patches each; the first on a single one, the last is dark.
   Lights lights(std::size_t count, std::uint32_t seed) const {
@@ -80,10 +83,9 @@ TEST_F(CorrectedSolverOfRoom, FindsTheLightOfTheLinks) {
 }
 
 TEST_F(CorrectedSolverOfRoom, MayBeginWithAnOperator) {
-  const Lights exitances = lights(9, 5), some = lights(48, 6);
+  const Lights exitances = lights(9, 5);
   const std::shared_ptr<const TransferOperator> nearly = build_matrix_free_transfer(
-      *form_factors_, patches(), {std::span(some).first(32), std::span(some).last(16)},
-      {.compression = {.tolerance = 0.03}});
+      *form_factors_, patches(), fitting_lights(6), {.compression = {.tolerance = 0.03}});
   const Lights truths = ReferenceSolver(links_, patches()).indirect_irradiances(exitances, 1e-12);
   for (const double residual : {1e-2, 1e-5}) {
     const Lights found = CorrectedSolver(*solved_, links_, patches(), nearly)
