@@ -28,12 +28,16 @@ constexpr double kCouplingBytes = 1.3;
 // the light that they are judged by (lab/114).
 constexpr std::size_t kSearchBytes = 7000;
 
-// Of OpenBLAS, for each thread but the first (lab/162).
-constexpr std::size_t kBlasBytes = 12'000'000;
+// Of OpenBLAS, for all threads but the first, each as far as its products fill it (lab/162,
+// lab/173).
+std::size_t blas_bytes(std::size_t patch_count, std::size_t thread_count) {
+  constexpr std::size_t kOfPatch = 6'000, kMost = 12'000'000;
+  return (thread_count - 1) * std::min(kMost, kOfPatch * patch_count);
+}
 
-// Of blocks that are at work while an operator is compressed (lab/114, lab/162).
+// Of blocks that are at work while an operator is compressed (lab/114, lab/173).
 std::size_t work_bytes(std::size_t patch_count) {
-  constexpr std::size_t kOfPatch = 16000, kMost = 8'000'000;
+  constexpr std::size_t kOfPatch = 14'000, kMost = 8'000'000;
   return std::min(kMost, kOfPatch * patch_count);
 }
 
@@ -65,7 +69,7 @@ MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::s
     const auto threads = static_cast<std::size_t>(plan.thread_count);
     plan.cell_count = (kGroupsOfThread * threads + matrix_count - 1) / matrix_count;
     plan.peak_bytes =
-        std::max(threads * group, threads * piece) + (threads - 1) * kBlasBytes + kept;
+        std::max(threads * group, threads * piece) + blas_bytes(patch_count, threads) + kept;
     if (limit == 0 || plan.peak_bytes <= limit || threads == 1) return plan;
   }
 }
@@ -82,7 +86,7 @@ std::uint64_t form_factor_compression_bytes(std::size_t patch_count) {
   const std::size_t candidates =
       std::min(kOfPair * patch_count * patch_count, kAtLeast + kOfPatch * patch_count);
   const auto threads = static_cast<std::size_t>(omp_get_max_threads());
-  return kFittingLightBytes * patch_count + candidates + (threads - 1) * kBlasBytes;
+  return kFittingLightBytes * patch_count + candidates + blas_bytes(patch_count, threads);
 }
 
 /// Throws Error if there is a memory limit and a plan does not fit into it.
