@@ -16,9 +16,6 @@ class SparseLight {
   /// `light`: [n], as many values as a patch index can count at most.
   explicit SparseLight(std::span<const Float3> light);
 
-  /// The number of patches, n.
-  std::size_t size() const { return size_; }
-
   /// The same values, [n], zeros too.
   std::vector<Float3> expanded() const;
 
@@ -28,7 +25,7 @@ class SparseLight {
     std::uint32_t begin, count;
   };
 
-  std::size_t size_;
+  std::size_t size_;  ///< n
   std::vector<Run> runs_;
   std::vector<Float3> values_;  ///< of the runs, one after the other
 };

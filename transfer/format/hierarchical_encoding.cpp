@@ -22,6 +22,11 @@ using Layout = HierarchicalLayout;
 
 using Order = HierarchicalStorage::Order;
 
+/// Whether a block of low rank, or a cluster basis, has a basis of its own for its columns.
+bool has_column_basis(const TransferBlock& block) {
+  return !block.on_diagonal() && !is_cluster_basis(block);
+}
+
 /// The values of a block in the order kByBlock.
 template <typename Value>
 struct BlockValues {
@@ -31,7 +36,7 @@ struct BlockValues {
       row_basis = from;
       from += std::uint64_t{block.row_rank} * block.row_count;
       column_basis = block.on_diagonal() ? row_basis : from;
-      if (!block.on_diagonal() && !is_cluster_basis(block)) {
+      if (has_column_basis(block)) {
         from += std::uint64_t{block.column_rank} * block.column_count;
       }
     }
@@ -84,7 +89,7 @@ void stream_block(const Layout& layout, std::size_t b, const TransferBlock& bloc
   };
   if (block.kind != TransferBlock::Kind::kDense) {
     copy_basis(from.row_basis, at.row, std::uint64_t{block.row_rank} * block.row_count);
-    if (!block.on_diagonal() && !is_cluster_basis(block)) {
+    if (has_column_basis(block)) {
       copy_basis(from.column_basis, at.column,
                  std::uint64_t{block.column_rank} * block.column_count);
     }

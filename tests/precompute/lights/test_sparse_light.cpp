@@ -23,9 +23,7 @@ TEST(SparseLight, HasTheValuesThatItWasMadeOf) {
       {kRed, kDark, kDark, kBlue},
   };
   for (const Exitance& light : lights) {
-    const SparseLight kept(light);
-    EXPECT_EQ(kept.size(), light.size());
-    EXPECT_EQ(kept.expanded(), light);
+    EXPECT_EQ(SparseLight(light).expanded(), light);
   }
   EXPECT_EQ(expanded(sparse_lights(lights)), lights);
 }
