@@ -38,8 +38,9 @@ ExchangeSource choose_form_factors(const BuildSettings& settings, const PatchMod
   const std::size_t n = model.patches.size();
   const bool too_many =
       n > kPairsPatchCount ||
-      peak_bytes_of_pairs(built_scene(n, model.mesh), distinct_channels(model.patches.reflectance),
-                          settings.operator_kind, settings.rank) > memory_limit_bytes(settings);
+      peak_bytes_of_pairs(pairs_build(built_scene(n, model.mesh),
+                                      distinct_channels(model.patches.reflectance), settings)) >
+          memory_limit_bytes(settings);
   return from_links && too_many ? ExchangeSource::kLinks : ExchangeSource::kPairs;
 }
 

@@ -22,15 +22,16 @@ namespace {
 // An entry of an ExchangeMatrix: a column and an exchange area.
 constexpr std::size_t kEntryBytes = sizeof(std::uint32_t) + sizeof(float);
 
-// A pair while form factors are computed: in rows, which grow by doubling, and in the matrix that
-// they are copied to.
-constexpr std::size_t kPairBytesMade = 3 * sizeof(ExchangeEntry) / 2 + kEntryBytes;
+// A pair while form factors are computed: in rows, and as its hemisphere rays count it, or in the
+// matrix that rows are copied to (lab/174).
+constexpr std::size_t kPairBytesMade = sizeof(ExchangeEntry) + 12;
 
 // A pair beside a dense operator that is checked: in the matrix, and expanded to rows.
 constexpr std::size_t kPairBytesKept = 2 * kEntryBytes;
 
-// A patch while form factors are computed: its points, and what its hemisphere rays meet.
-constexpr std::size_t kPatchBytesOfPairs = 21'000;
+// A patch while form factors are computed: its points, and what its hemisphere rays meet beside
+// pairs that are counted already (lab/174).
+constexpr std::size_t kPatchBytesOfPairs = 5000;
 
 // A micro-triangle of an opacity map, where points are chosen on patches.
 constexpr std::size_t kMicroTriangleBytes = 44;
@@ -43,11 +44,6 @@ constexpr std::size_t kVertexBytes = 400, kWeighedBytes = 3000, kWeighedOfPatch 
 // proportion to the products, up to the size of its buffers.
 constexpr std::size_t kLibraryBytes = 2'000'000, kLibraryBytesOfPatch = 20'000,
                       kMostLibraryBytes = 12'000'000;
-
-// What each thread but the first takes beside that while an operator is compressed: the buffer of
-// OpenBLAS, as far as products fill it, or more where its blocks are larger (lab/137).
-constexpr std::size_t kBufferBytesOfPatch = 24'000, kBufferBytes = 11'000'000,
-                      kThreadBytesOfPatch = 14'000;
 
 // Copies of the factors of a low-rank operator while they are found.
 constexpr std::size_t kFactorCopies = 6;
@@ -120,10 +116,9 @@ std::uint64_t bytes_of_libraries(std::size_t patch_count) {
   return std::min(kMostLibraryBytes, kLibraryBytes + kLibraryBytesOfPatch * patch_count);
 }
 
-std::uint64_t bytes_of_threads(std::size_t patch_count) {
-  const auto others = static_cast<std::size_t>(omp_get_max_threads()) - 1;
-  return others * std::max(std::min(kBufferBytes, kBufferBytesOfPatch * patch_count),
-                           kThreadBytesOfPatch * patch_count);
+PairsBuild pairs_build(const PatchModel& model, const BuildSettings& decided) {
+  return pairs_build(built_scene(model, decided), distinct_channels(model.patches.reflectance),
+                     decided);
 }
 
 MatrixFreeTransferPlan plan_after_links(const LinkedBuild& build, std::uint64_t limit_bytes) {
@@ -174,27 +169,35 @@ LinkedBuild linked_build(const BuiltScene& scene, std::size_t link_count, std::u
           roles,      tolerance};
 }
 
-std::uint64_t peak_bytes_of_pairs(const BuiltScene& scene, std::size_t matrix_count,
-                                  OperatorKind kind, std::size_t rank) {
-  const std::uint64_t n = scene.patch_count, pairs = n * n / 4;
-  const std::uint64_t found = kPairBytesMade * pairs + kPatchBytesOfPairs * n +
+PairsBuild pairs_build(const BuiltScene& scene, std::size_t matrix_count,
+                       const BuildSettings& settings) {
+  return {.scene = scene,
+          .held_bytes = resident_memory_bytes(),
+          .pair_count = scene.patch_count * scene.patch_count / 4,
+          .matrix_count = matrix_count,
+          .kind = settings.operator_kind,
+          .rank = settings.rank};
+}
+
+std::uint64_t peak_bytes_of_pairs(const PairsBuild& build) {
+  const BuiltScene& scene = build.scene;
+  const std::uint64_t n = scene.patch_count, kept = kEntryBytes * build.pair_count;
+  const std::uint64_t found = kPairBytesMade * build.pair_count + kPatchBytesOfPairs * n +
                               kMicroTriangleBytes * scene.micro_triangle_count;
-  const std::uint64_t before = resident_memory_bytes() + bytes_of_libraries(scene.patch_count);
-  const std::uint64_t most = std::max(found, kEntryBytes * pairs + bytes_of_weights(scene));
-  if (kind == OperatorKind::kNoOperator) return before + most;
+  const std::uint64_t before = build.held_bytes + bytes_of_libraries(scene.patch_count);
+  const std::uint64_t most = std::max(found, kept + bytes_of_weights(scene));
+  if (build.kind == OperatorKind::kNoOperator) return before + most;
   const std::uint64_t inverses =
-      dense_transfer_peak_bytes(scene.patch_count, matrix_count, arithmetic_of(kind));
-  const std::uint64_t inverse = n * n / 2 * matrix_count * sizeof(float);
-  std::uint64_t last = kPairBytesKept * pairs + inverse;
-  if (kind == OperatorKind::kHierarchical) {
-    last = kEntryBytes * pairs + bytes_of_threads(scene.patch_count) +
-           dense_compression_peak_bytes(scene.patch_count, matrix_count);
-  } else if (kind == OperatorKind::kLowRank) {
-    const std::uint64_t factors = kFactorCopies * n * std::min<std::uint64_t>(rank, n);
-    last = kEntryBytes * pairs + inverse + factors * matrix_count * sizeof(float);
+      dense_transfer_peak_bytes(scene.patch_count, build.matrix_count, arithmetic_of(build.kind));
+  const std::uint64_t inverse = n * n / 2 * build.matrix_count * sizeof(float);
+  std::uint64_t last = kPairBytesKept * build.pair_count + inverse;
+  if (build.kind == OperatorKind::kHierarchical) {
+    last = kept + dense_compression_peak_bytes(scene.patch_count, build.matrix_count);
+  } else if (build.kind == OperatorKind::kLowRank) {
+    const std::uint64_t factors = kFactorCopies * n * std::min<std::uint64_t>(build.rank, n);
+    last = kept + inverse + factors * build.matrix_count * sizeof(float);
   }
-  return before + std::max({most, kEntryBytes * pairs + inverses, last,
-                            kEntryBytes * pairs + scene.row_bytes});
+  return before + std::max({most, kept + inverses, last, kept + scene.row_bytes});
 }
 
 std::uint64_t peak_bytes_of_links(const LinkedBuild& build) {
@@ -226,16 +229,14 @@ std::size_t finer_link_count(std::size_t forecast, std::size_t patch_count) {
 
 CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
                            const BuildSettings& decided, std::size_t link_count) {
-  const BuiltScene scene = built_scene(model, decided);
-  const std::uint32_t matrices = distinct_channels(model.patches.reflectance);
-  CostEstimate estimate = estimate_of(scene.patch_count, roles);
+  CostEstimate estimate = estimate_of(model.patches.size(), roles);
   if (decided.exchange_source == ExchangeSource::kPairs) {
-    estimate.peak_bytes = peak_bytes_of_pairs(scene, matrices, decided.operator_kind, decided.rank);
+    estimate.peak_bytes = peak_bytes_of_pairs(pairs_build(model, decided));
     return estimate;
   }
-  const LinkedBuild build{scene,      resident_memory_bytes(),
-                          link_count, matrices,
-                          roles,      kCompressionPart * decided.tolerance};
+  const LinkedBuild build =
+      linked_build(built_scene(model, decided), link_count, 0, model.patches.reflectance, roles,
+                   kCompressionPart * decided.tolerance);
   estimate.peak_bytes = peak_bytes_of_links(build);
   if (decided.operator_kind != OperatorKind::kNoOperator) {
     estimate.peak_bytes =
@@ -246,8 +247,12 @@ CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
 
 void sample_pairs(const PatchModel& model, const RayTracer& tracer, const BuildSettings& decided,
                   const Progress& progress, CostEstimate& estimate) {
-  estimate.form_factor_seconds =
-      forecast_form_factors(model, tracer, decided.form_factors, progress).seconds;
+  PairsBuild build = pairs_build(model, decided);
+  const FormFactorForecast forecast =
+      forecast_form_factors(model, tracer, decided.form_factors, progress);
+  build.pair_count = static_cast<std::size_t>(forecast.entry_count);
+  estimate.peak_bytes = peak_bytes_of_pairs(build);
+  estimate.form_factor_seconds = forecast.seconds;
   if (decided.operator_kind == OperatorKind::kNoOperator) return;
   estimate.inverse_seconds =
       forecast_dense_transfer(estimate.patch_count, distinct_channels(model.patches.reflectance),

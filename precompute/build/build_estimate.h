@@ -34,11 +34,22 @@ BuiltScene built_scene(std::size_t patch_count, const DisplayMesh& mesh);
 /// Those of a model, with the rows of receivers that `decided` asks for.
 BuiltScene built_scene(const PatchModel& model, const BuildSettings& decided);
 
-/// Peak memory of the process while it makes form factors and operator from pairs, if half of all
-/// patches face each other: on top of what it holds when this is called.
-/// `matrix_count`: distinct reflectance channels; `rank`: of a low-rank operator.
-std::uint64_t peak_bytes_of_pairs(const BuiltScene& scene, std::size_t matrix_count,
-                                  OperatorKind kind, std::size_t rank);
+/// The quantities that the memory of a build from pairs depends on.
+struct PairsBuild {
+  BuiltScene scene{};
+  std::uint64_t held_bytes = 0;  ///< by the process before
+  std::size_t pair_count = 0;    ///< pairs of patches that exchange light
+  std::size_t matrix_count = 1;  ///< distinct reflectance channels
+  OperatorKind kind = OperatorKind::kNoOperator;
+  std::size_t rank = 0;  ///< of a low-rank operator
+};
+
+/// Of a process that holds its patches, if half of all pairs exchange light.
+PairsBuild pairs_build(const BuiltScene& scene, std::size_t matrix_count,
+                       const BuildSettings& settings);
+
+/// Peak memory of the process while it makes form factors and operator from pairs.
+std::uint64_t peak_bytes_of_pairs(const PairsBuild& build);
 
 /// The quantities that the memory of a build from links depends on.
 struct LinkedBuild {
@@ -78,8 +89,8 @@ std::size_t finer_link_count(std::size_t forecast, std::size_t patch_count);
 CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
                            const BuildSettings& decided, std::size_t link_count);
 
-/// Adds the time that form factors and a dense inverse from pairs take, by short samples of either.
-/// Throws Cancelled if asked to stop.
+/// Adds the time that form factors and a dense inverse from pairs take, by short samples of either,
+/// and corrects the memory by the pairs that exchange light. Throws Cancelled if asked to stop.
 void sample_pairs(const PatchModel& model, const RayTracer& tracer, const BuildSettings& decided,
                   const Progress& progress, CostEstimate& estimate);
 

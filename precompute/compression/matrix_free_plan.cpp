@@ -24,9 +24,9 @@ constexpr double kOperatorBytes = 6.0e3, kRoomCouplings = 450, kOperatorGrowth =
 // Bytes of a coupling (pack_couplings), with what more vectors than in rooms take (lab/156).
 constexpr double kCouplingBytes = 1.3;
 
-// Of a patch while a dense operator is compressed, beside the lights: candidates of the search and
-// the light that they are judged by (lab/114).
-constexpr std::size_t kSearchBytes = 7000;
+// Of a patch and a matrix while a dense operator is compressed, beside the lights: candidates of
+// the search (lab/174).
+constexpr std::size_t kSearchBytes = 1500;
 
 // Of OpenBLAS, for all threads but the first, each as far as its products fill it (lab/162,
 // lab/173).
@@ -75,9 +75,17 @@ MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::s
 }
 
 std::uint64_t dense_compression_peak_bytes(std::size_t patch_count, std::size_t matrix_count) {
+  // Blocks at work, each over all matrices: of a small operator, which is one piece, and of each
+  // thread but the first with its share of OpenBLAS (lab/174).
+  constexpr std::size_t kOfPiece = 9'500, kMostOfPiece = 4'800'000;
+  constexpr std::size_t kOfThread = 2'500, kMostOfThread = 4'200'000;
+  const auto others = static_cast<std::size_t>(omp_get_max_threads()) - 1;
+  const std::size_t wide = 1 + matrix_count;
   const std::uint64_t triangle = static_cast<std::uint64_t>(patch_count) * patch_count / 2;
   return triangle * sizeof(float) * matrix_count +
-         patch_count * (kFittingLightBytes + kSearchBytes) + work_bytes(patch_count);
+         std::max(wide * std::min(kOfPiece * patch_count, kMostOfPiece),
+                  patch_count * (kFittingLightBytes + kSearchBytes * matrix_count)) +
+         others * wide * std::min(kOfThread * patch_count, kMostOfThread);
 }
 
 std::uint64_t form_factor_compression_bytes(std::size_t patch_count) {

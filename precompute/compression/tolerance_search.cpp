@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "precompute/base/process_memory.h"
 #include "precompute/compression/matrix_compression.h"
 #include "precompute/compression/multiplier_search.h"
 #include "precompute/lights/reference_lighting.h"
@@ -168,6 +169,7 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
   for (int round = 0; round < kMostRounds && !search.done(); ++round) {
     const Progress part = part_of(progress, part_of_search(round), part_of_search(round + 1));
     const KeptParts kept{checkpoint, fmt::format("round_{}", round)};
+    return_freed_memory();  // of lights that are kept otherwise now, and of the round before
     const auto candidate = std::make_shared<const HierarchicalOperator>(
         encode_values(compression.at(search.multiplier(), kept, part), settings.precision));
     const std::vector<double> errors = validation.errors(*candidate);

@@ -19,6 +19,7 @@ struct EscapedLight {
 struct FormFactorForecast {
   double seconds = 0;  ///< with all OpenMP threads
   double ray_count = 0;
+  double entry_count = 0;  ///< pairs of patches that exchange light
 };
 
 }  // namespace rebounce

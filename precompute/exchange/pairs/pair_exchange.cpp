@@ -16,6 +16,10 @@ constexpr double kDoubt = 2, kContradiction = 4;
 constexpr double kLargePart = 3e-4;
 constexpr int kLargeFactor = 6;
 
+// The rays of mixed pairs that are traced together, so that those of a long row fit the nearest
+// caches.
+constexpr std::size_t kRaysTogether = 1 << 14;
+
 // A pair whose rays all agree may still be partly hidden: its variance is this fraction of the
 // squared exchange instead of zero.
 constexpr double kVisibilityVarianceFloor = 1e-6;
@@ -91,10 +95,20 @@ bool PairExchange::is_contradicted(std::uint32_t i, const FacingPatch& pair,
   return std::abs(pair.count - expected) > deviations * std::sqrt(expected + 1);
 }
 
+/// Traces `full` rays for each of `pairs`, some pairs at a time, and adds them to row i.
+void PairExchange::append_mixed(std::uint32_t i, std::span<const FacingPatch> pairs, int full,
+                                Scratch& scratch, std::vector<ExchangeEntry>& row) const {
+  const std::size_t together = std::max<std::size_t>(1, kRaysTogether / full);
+  for (std::size_t begin = 0; begin < pairs.size(); begin += together) {
+    const std::size_t count = std::min(together, pairs.size() - begin);
+    append_traced(i, pairs.subspan(begin, count), full, scratch, row);
+  }
+}
+
 /// Traces `full` rays for each of `pairs` and adds the mean of shadow rays and hemisphere rays,
 /// weighted by the inverse of their variances, to row i.
-void PairExchange::append_mixed(std::uint32_t i, const std::vector<FacingPatch>& pairs, int full,
-                                Scratch& scratch, std::vector<ExchangeEntry>& row) const {
+void PairExchange::append_traced(std::uint32_t i, std::span<const FacingPatch> pairs, int full,
+                                 Scratch& scratch, std::vector<ExchangeEntry>& row) const {
   shadow_rays_.make_rays(i, pairs, full, scratch.rays);
   trace(scratch);
   for (std::size_t p = 0; p < pairs.size(); ++p) {

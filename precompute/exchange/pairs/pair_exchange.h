@@ -51,8 +51,10 @@ class PairExchange {
  private:
   bool is_contradicted(std::uint32_t i, const FacingPatch& pair, ShadowRays::Agreement agreement,
                        double deviations) const;
-  void append_mixed(std::uint32_t i, const std::vector<FacingPatch>& pairs, int full,
-                    Scratch& scratch, std::vector<ExchangeEntry>& row) const;
+  void append_mixed(std::uint32_t i, std::span<const FacingPatch> pairs, int full, Scratch& scratch,
+                    std::vector<ExchangeEntry>& row) const;
+  void append_traced(std::uint32_t i, std::span<const FacingPatch> pairs, int full,
+                     Scratch& scratch, std::vector<ExchangeEntry>& row) const;
   void append_mean(std::uint32_t i, const FacingPatch& pair, const ShadowRays::Visibility& visible,
                    std::vector<ExchangeEntry>& row) const;
   void trace(Scratch& scratch) const;

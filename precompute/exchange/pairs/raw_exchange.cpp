@@ -25,22 +25,45 @@ constexpr int kDefaultRays = 64;
 
 // A forecast samples one of kForecastShare patches, within these limits, in runs of neighbours,
 // whose rays meet similar surfaces.
-constexpr std::size_t kForecastShare = 32, kForecastLeast = 64, kForecastMost = 512;
-constexpr std::size_t kForecastRun = 16;
+constexpr std::size_t kForecastShare = 32, kForecastLeast = 128, kForecastMost = 512;
+constexpr std::size_t kForecastRun = 8;
 
-std::vector<std::uint32_t> sample_of_patches(std::size_t patch_count) {
-  const std::size_t wanted =
-      std::clamp(patch_count / kForecastShare, kForecastLeast, kForecastMost);
-  const std::size_t runs = std::min(wanted / kForecastRun, patch_count);
-  const std::size_t length = std::min(patch_count / runs, kForecastRun);
-  std::vector<std::uint32_t> sample;
-  for (std::size_t run = 0; run < runs; ++run) {
-    const std::size_t begin = (2 * run + 1) * patch_count / (2 * runs) - length / 2;
-    for (std::size_t k = 0; k < length; ++k)
-      sample.push_back(static_cast<std::uint32_t>(begin + k));
+/// Some patches, in runs of neighbours.
+class PatchSample {
+ public:
+  explicit PatchSample(std::size_t patch_count) : run_(patch_count, kNoRun) {
+    const std::size_t wanted =
+        std::clamp(patch_count / kForecastShare, kForecastLeast, kForecastMost);
+    const std::size_t runs = std::min(wanted / kForecastRun, patch_count);
+    const std::size_t length = std::min(patch_count / runs, kForecastRun);
+    for (std::size_t run = 0; run < runs; ++run) {
+      const std::size_t begin = (2 * run + 1) * patch_count / (2 * runs) - length / 2;
+      for (std::size_t k = begin; k < begin + length; ++k) {
+        patches_.push_back(static_cast<std::uint32_t>(k));
+        run_[k] = static_cast<std::uint32_t>(run);
+      }
+    }
+    const std::size_t within = runs * length * length;
+    pair_count_ = (patches_.size() * patches_.size() - within) / 2;
   }
-  return sample;
-}
+
+  const std::vector<std::uint32_t>& patches() const { return patches_; }
+  bool has(std::uint32_t i) const { return run_[i] != kNoRun; }
+
+  /// The pairs of patches of different runs. Neighbours see each other less than others do.
+  std::size_t pair_count() const { return pair_count_; }
+  /// The number of them in row i.
+  std::size_t count_pairs(std::uint32_t i, std::span<const ExchangeEntry> row) const {
+    return static_cast<std::size_t>(std::ranges::count_if(row, [&](const ExchangeEntry& entry) {
+      return has(entry.column) && run_[entry.column] != run_[i];
+    }));
+  }
+
+ private:
+  static constexpr std::uint32_t kNoRun = 0xFFFFFFFF;
+  std::vector<std::uint32_t> patches_, run_;
+  std::size_t pair_count_ = 0;
+};
 
 class RawExchangeBuilder {
  public:
@@ -85,26 +108,28 @@ class RawExchangeBuilder {
   /// Forecasts from the pairs of some patches with each other.
   FormFactorForecast forecast() {
     const std::size_t n = geometry_.patch_count();
-    const std::vector<std::uint32_t> sample = sample_of_patches(n);
-    std::vector<bool> sampled(n);
-    for (const std::uint32_t i : sample) sampled[i] = true;
-    const auto wanted = [&](std::uint32_t j) { return sampled[j]; };
+    const PatchSample sample(n);
+    const auto wanted = [&](std::uint32_t j) { return sample.has(j); };
     const auto begin = Clock::now();
-    trace_hemispheres(sample, [](double done) { return 0.5 * done; });
+    trace_hemispheres(sample.patches(), [](double done) { return 0.5 * done; });
     const auto between = Clock::now();
+    std::atomic<std::size_t> entries = 0;
     for_each_patch(
-        sample,
+        sample.patches(),
         [&](std::uint32_t i, Scratch& scratch) {
           std::vector<ExchangeEntry> row;
           compute_row(i, wanted, scratch, row);
+          entries += sample.count_pairs(i, row);
         },
         [](double done) { return 0.5 + 0.5 * done; });
     const std::chrono::duration<double> hemispheres = between - begin,
                                         pairs = Clock::now() - between;
-    const double share = static_cast<double>(n) / static_cast<double>(sample.size());
+    const double share = static_cast<double>(n) / static_cast<double>(sample.patches().size());
+    const double sampled_pairs = static_cast<double>(std::max<std::size_t>(1, sample.pair_count()));
     return {hemispheres.count() * share + pairs.count() * share * share,
             static_cast<double>(hemisphere_ray_count(n)) +
-                static_cast<double>(ray_count_) * share * share};
+                static_cast<double>(ray_count_) * share * share,
+            static_cast<double>(entries) / sampled_pairs * static_cast<double>(n * n) / 2};
   }
 
  private:
@@ -164,8 +189,7 @@ class RawExchangeBuilder {
     append_fine(i, settings_.probe_rays, wanted, scratch, row);
     pair_count_ += scratch.facing.size();
     append_coarse(i, row);
-    row.shrink_to_fit();  // all rows together are the largest thing there is
-    std::ranges::sort(row, {}, &ExchangeEntry::column);
+    finish(row);
   }
 
   /// Adds the pairs (i, j) that are not coarse and have `wanted`(j), with `probe` rays at first.
@@ -197,6 +221,11 @@ class RawExchangeBuilder {
       return is_doubtful(entry.column) && !is_coarse_pair(geometry_, i, entry.column);
     });
     append_fine(i, kRefinedProbes * settings_.probe_rays, is_doubtful, scratch, row);
+    finish(row);
+  }
+
+  static void finish(std::vector<ExchangeEntry>& row) {
+    row.shrink_to_fit();  // all rows together are the largest thing there is
     std::ranges::sort(row, {}, &ExchangeEntry::column);
   }
 

@@ -41,7 +41,7 @@ std::uint64_t ShadowRays::shift_of_pair(std::uint32_t i, std::uint32_t j) const 
   return mix_bits(seed_ * 0x9E3779B9ULL + ((first << 32) | second));
 }
 
-void ShadowRays::make_rays(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
+void ShadowRays::make_rays(std::uint32_t i, std::span<const FacingPatch> facing, int count,
                            std::vector<Ray>& rays) const {
   rays.resize(facing.size() * count);
   for (std::size_t p = 0; p < facing.size(); ++p) {

@@ -84,7 +84,7 @@ class ShadowRays {
   /// weight (ray_weight), between points of Sobol's sequence (sobol_blocks.h) over both patches.
   /// Rays between points that do not face each other carry no light and are not made; if a pair has
   /// fewer than `count`, the rest are void rays (is_void) that are never occluded.
-  void make_rays(std::uint32_t i, const std::vector<FacingPatch>& facing, int count,
+  void make_rays(std::uint32_t i, std::span<const FacingPatch> facing, int count,
                  std::vector<Ray>& rays) const;
 
   /// The same for probe rays, which tell whether a pair is partly hidden: the first kCornerRays

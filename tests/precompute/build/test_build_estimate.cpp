@@ -19,18 +19,27 @@ namespace {
 
 constexpr std::uint64_t kPlenty = 1ULL << 40;
 
+BuildSettings settings_of(OperatorKind kind) {
+  BuildSettings settings;
+  settings.operator_kind = kind;
+  settings.rank = 256;
+  return settings;
+}
+
 TEST(BuildEstimate, OfPairsHoldsTheirArraysOfEveryKind) {
   // Half of all pairs: of 16 bytes in rows and 8 in the matrix, or of 8 in the matrix beside the
   // inverse.
   constexpr std::size_t kPatches = 4096, kPairs = kPatches * kPatches / 4;
-  EXPECT_GE(peak_bytes_of_pairs({kPatches}, 3, OperatorKind::kNoOperator, 0), (16 + 8) * kPairs);
+  EXPECT_GE(peak_bytes_of_pairs(pairs_build({kPatches}, 3, settings_of(OperatorKind::kNoOperator))),
+            (16 + 8) * kPairs);
   for (const OperatorKind kind :
        {OperatorKind::kDense, OperatorKind::kHierarchical, OperatorKind::kLowRank}) {
     const bool dense = kind == OperatorKind::kDense;
     for (const std::size_t matrices : {1U, 3U}) {
       // Triangles of the operator in floats and of the system, in doubles if the operator is exact.
       const std::size_t triangles = 2 * kPairs * (4 * matrices + (dense ? 8 : 4));
-      const std::uint64_t bytes = peak_bytes_of_pairs({kPatches}, matrices, kind, 256);
+      const std::uint64_t bytes =
+          peak_bytes_of_pairs(pairs_build({kPatches}, matrices, settings_of(kind)));
       // In small scenes the lights that a hierarchical operator is fitted to take the most.
       if (kind == OperatorKind::kHierarchical) {
         EXPECT_GE(bytes, 2 * kPairs * 4 * matrices + kPatches * kFittingLightBytes);
@@ -113,8 +122,8 @@ TEST(BuildEstimate, HoldsWhatTheBuildHasTakenAlready) {
 TEST(BuildEstimate, RowsOfReceiversAreAStageOfTheirOwn) {
   constexpr std::size_t kPatches = 1000;
   const auto bytes = [](std::uint64_t rows) {
-    return peak_bytes_of_pairs({.patch_count = kPatches, .row_bytes = rows}, 1,
-                               OperatorKind::kDense, 0);
+    return peak_bytes_of_pairs(pairs_build({.patch_count = kPatches, .row_bytes = rows}, 1,
+                                           settings_of(OperatorKind::kDense)));
   };
   constexpr std::uint64_t kFew = 1000, kMany = 1ULL << 30;
   EXPECT_NEAR(static_cast<double>(bytes(kFew)), static_cast<double>(bytes(0)), 1e6);

@@ -195,9 +195,14 @@ TEST(FormFactors, AreForecastByASample) {
     const FormFactorForecast one = test::with_threads(1, make), three = test::with_threads(3, make);
     EXPECT_EQ(one.ray_count, three.ray_count);
     EXPECT_GT(one.seconds, 0);
-    const auto rays = static_cast<double>(form_factors_of(model).ray_count);
+    EXPECT_EQ(one.entry_count, three.entry_count);
+    const FormFactors found = form_factors_of(model);
+    const auto rays = static_cast<double>(found.ray_count);
     EXPECT_GT(one.ray_count, 0.6 * rays);
     EXPECT_LT(one.ray_count, 1.6 * rays);
+    const auto entries = static_cast<double>(found.exchange.column.size());
+    EXPECT_GT(one.entry_count, 0.7 * entries);
+    EXPECT_LT(one.entry_count, 1.4 * entries);
   }
 }
 
