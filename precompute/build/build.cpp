@@ -105,12 +105,15 @@ class TransferBuild {
           "lightmap", [&](const Progress&) { return make_lightmap(model_, settings_, report_); });
     }
     decided_ = decide(settings_, model_);
-    const bool links = decided_.exchange_source == ExchangeSource::kLinks;
-    std::size_t link_count = links ? forecast_links(model_, tracer(), decided_, clock_) : 0;
-    if (judges_links()) link_count = finer_link_count(link_count, model_.patches.size());
-    report_.estimate = estimate_cost(model_, roles_, decided_, link_count);
-    const bool fits = report_.estimate.peak_bytes <= decided_.memory_limit_bytes;
-    if (fits && decided_.exchange_source == ExchangeSource::kPairs) forecast_pairs();
+    estimate();
+    if (settings_.exchange_source == ExchangeSource::kAutomatic && !fits() &&
+        decided_.exchange_source == ExchangeSource::kPairs &&
+        decided_.operator_kind == OperatorKind::kHierarchical) {
+      BuildSettings from_links = settings_;
+      from_links.exchange_source = ExchangeSource::kLinks;
+      decided_ = decide(from_links, model_);
+      estimate();
+    }
     announce(report_.estimate);
   }
 
@@ -194,7 +197,18 @@ class TransferBuild {
     return std::move(data_);
   }
 
-  /// Forecasts the time of a build from pairs, from short samples.
+  /// Estimates what the build will cost, as it is decided.
+  void estimate() {
+    const bool links = decided_.exchange_source == ExchangeSource::kLinks;
+    std::size_t link_count = links ? forecast_links(model_, tracer(), decided_, clock_) : 0;
+    if (judges_links()) link_count = finer_link_count(link_count, model_.patches.size());
+    report_.estimate = estimate_cost(model_, roles_, decided_, link_count);
+    if (fits() && !links) forecast_pairs();
+  }
+
+  bool fits() const { return report_.estimate.peak_bytes <= decided_.memory_limit_bytes; }
+
+  /// Forecasts the cost of a build from pairs, from short samples.
   void forecast_pairs() {
     clock_.run("estimate", [&](const Progress& part) {
       sample_pairs(model_, tracer(), decided_, part, report_.estimate);
