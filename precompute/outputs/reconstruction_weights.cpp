@@ -157,7 +157,9 @@ class ReconstructionWeights {
           if (!receivers_[v].is_shown) return;
           std::vector<ReconstructionSite> sites = find_sites(search, v, scratch);
           centre_weights(receivers_[v], sites);
-          if (std::ranges::all_of(sites, is(Exposure::kCovered))) shows_arriving_[v] = 1;
+          if (std::ranges::all_of(sites, is(Exposure::kCovered)) || are_mostly_covered(sites)) {
+            shows_arriving_[v] = 1;
+          }
           weights[v] = shows_arriving_[v] != 0 ? plain_weights(sites) : open_weights(sites);
         });
   }
@@ -309,6 +311,17 @@ class ReconstructionWeights {
       good[i] = is_good ? 1 : 0;
     }
     return good;
+  }
+
+  /// Whether nearly all of the light over the patches is absorbed. To show the rest as light in the
+  /// open would multiply all of its errors.
+  bool are_mostly_covered(const std::vector<ReconstructionSite>& sites) const {
+    double open = 0, whole = 0;
+    for (const ReconstructionSite& site : sites) {
+      open += site.weight * (1.0 - absorbed_[site.patch]);
+      whole += site.weight;
+    }
+    return open < (1 - kMostlyCovered) * whole;
   }
 
   /// The weights of light in the open; a patch only shows the fraction that is not absorbed.

@@ -216,6 +216,22 @@ TEST(ReconstructionWeights, UndoWhatCoveringTakesAway) {
   }
 }
 
+TEST(ReconstructionWeights, ArriveAsTheyAreWhereNearlyAllLightIsAbsorbed) {
+  Scene scene = test::empty_scene();
+  add_tiled_floor(scene, 8);
+  PatchModel model = make_patch_model(std::move(scene), {.patch_count = 64});
+  for (const float part : {0.5F, 0.99F, 0.9997F}) {
+    SCOPED_TRACE(part);
+    const std::vector<float> absorbed(model.patches.size(), part);
+    compute_reconstruction_weights(model.shown_patch, absorbed, test::make_tracer(model),
+                                   model.mesh);
+    const double wanted = part < 0.9F ? 1 / (1 - part) : 1;
+    for (std::size_t v = 0; v < model.mesh.position.size(); ++v) {
+      EXPECT_NEAR(shown_value(model, v, [](const Float3&) { return 1.0; }), wanted, 1e-3);
+    }
+  }
+}
+
 TEST(ReconstructionWeights, WhatHasNoPatchShowsTheLightBesideIt) {
   // What is taken for hidden shows light where it meets others in the open, unless it is walled in.
   const std::vector<glm::dvec3> corner = {{0, 0, 0}, {0, 0, 0.2}, {0.2, 0, 0.2}};
