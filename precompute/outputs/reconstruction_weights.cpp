@@ -313,21 +313,24 @@ class ReconstructionWeights {
     return good;
   }
 
+  /// The sum of the weights times the fractions that are not absorbed.
+  double open_sum(const std::vector<ReconstructionSite>& sites) const {
+    double sum = 0;
+    for (const ReconstructionSite& site : sites) sum += site.weight * (1.0 - absorbed_[site.patch]);
+    return sum;
+  }
+
   /// Whether nearly all of the light over the patches is absorbed. To show the rest as light in the
   /// open would multiply all of its errors.
   bool are_mostly_covered(const std::vector<ReconstructionSite>& sites) const {
-    double open = 0, whole = 0;
-    for (const ReconstructionSite& site : sites) {
-      open += site.weight * (1.0 - absorbed_[site.patch]);
-      whole += site.weight;
-    }
-    return open < (1 - kMostlyCovered) * whole;
+    double whole = 0;
+    for (const ReconstructionSite& site : sites) whole += site.weight;
+    return open_sum(sites) < (1 - kMostlyCovered) * whole;
   }
 
   /// The weights of light in the open; a patch only shows the fraction that is not absorbed.
   VertexWeights open_weights(const std::vector<ReconstructionSite>& sites) const {
-    double sum = 0;
-    for (const ReconstructionSite& site : sites) sum += site.weight * (1.0 - absorbed_[site.patch]);
+    const double sum = open_sum(sites);
     VertexWeights weight;
     if (sum <= 0) return weight;
     for (const ReconstructionSite& site : sites) {
