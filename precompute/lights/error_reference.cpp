@@ -2,8 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-
-#include "transfer/base/area_norm.h"
+#include <limits>
 
 namespace rebounce {
 
@@ -21,6 +20,12 @@ double ErrorReference::reference(std::size_t light) const {
   return std::max(lights_[light].received, usual * lights_[light].all);
 }
 
+double ErrorReference::error(std::size_t light, double distance) const {
+  const double of = reference(light);
+  if (of > 0) return distance / of;
+  return distance > 0 ? std::numeric_limits<double>::infinity() : 0;
+}
+
 double ErrorReference::part() const {
   double logarithms = 0;
   int count = 0;
@@ -31,16 +36,6 @@ double ErrorReference::part() const {
     ++count;
   }
   return count > 0 ? std::exp(logarithms / count) : 1;
-}
-
-double received_error(std::span<const Float3> values, std::span<const Float3> truth,
-                      std::span<const float> area, double reference) {
-  if (reference == area_norm(truth, area)) return relative_difference(values, truth, area);
-  std::vector<Float3> difference(values.begin(), values.end());
-  for (std::size_t i = 0; i < difference.size(); ++i) {
-    for (int c = 0; c < kChannelCount; ++c) difference[i][c] -= truth[i][c];
-  }
-  return area_norm(difference, area) / reference;
 }
 
 }  // namespace rebounce

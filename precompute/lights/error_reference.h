@@ -1,9 +1,7 @@
 #pragma once
 
-#include <span>
+#include <cstddef>
 #include <vector>
-
-#include "rebounce/types.h"
 
 namespace rebounce {
 
@@ -22,6 +20,10 @@ class ErrorReference {
   /// The reference of a light, numbered in the order of adding.
   double reference(std::size_t light) const;
 
+  /// The error of a light: `distance`, the area norm of what the values at receivers are off,
+  /// divided by the reference. 0 if both are 0; infinite if only the reference is 0.
+  double error(std::size_t light, double distance) const;
+
   /// The geometric mean of the references over the lights, as a fraction of all that arrives.
   double part() const;
 
@@ -33,10 +35,5 @@ class ErrorReference {
   std::vector<Norms> lights_;
   double squares_ = 0;  ///< sum of the squared fractions
 };
-
-/// The area norm of values - truth, divided by `reference`. If that is the norm of `truth`, this is
-/// the relative difference.
-double received_error(std::span<const Float3> values, std::span<const Float3> truth,
-                      std::span<const float> area, double reference);
 
 }  // namespace rebounce

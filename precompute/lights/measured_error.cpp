@@ -14,7 +14,6 @@
 #include "rebounce/error.h"
 #include "runtime/rays/sampling.h"
 #include "transfer/base/area_norm.h"
-#include "transfer/base/parallel.h"
 
 namespace rebounce {
 namespace {
@@ -119,7 +118,7 @@ std::vector<LightError> light_errors(const TransferData& data,
   std::vector<Float3> indirect_irradiance(data.patches.size());
   std::vector<float> workspace(data.transfer->workspace_size());
   ErrorReference received;
-  std::vector<std::vector<Float3>> arrived, results;
+  std::vector<double> distances;
   std::vector<LightError> errors;
   for (std::size_t done = 0; done < lights.size(); done += kLightsTogether) {
     report_progress(progress, static_cast<double>(done) / lights.size());
@@ -134,13 +133,10 @@ std::vector<LightError> light_errors(const TransferData& data,
       const double seen = area_norm(truths[k], area);
       received.add(seen, all);
       errors.push_back({.arriving = seen / area_norm(some[k], area), .light = done + k});
-      results.push_back(indirect_irradiance);
-      arrived.push_back(std::move(truths[k]));
+      distances.push_back(area_distance(indirect_irradiance, truths[k], area));
     }
   }
-  parallel_for({}, results.size(), [&](std::size_t k) {
-    errors[k].error = received_error(results[k], arrived[k], area, received.reference(k));
-  });
+  for (std::size_t k = 0; k < errors.size(); ++k) errors[k].error = received.error(k, distances[k]);
   return errors;
 }
 

@@ -106,8 +106,8 @@ std::vector<double> ReferenceLighting::errors(const TransferOperator& transfer) 
       transfer.apply(lights_[first + k].expanded(), results[k], workspace);
     }
     parallel_for({}, count, [&](std::size_t k) {
-      errors[first + k] =
-          received_error(results[k], truths_[first + k], area_, received_.reference(first + k));
+      const std::size_t light = first + k;
+      errors[light] = received_.error(light, area_distance(results[k], truths_[light], area_));
     });
   }
   return errors;

@@ -34,8 +34,8 @@ double area_norm(std::span<const Float3> values, std::span<const float> area) {
   return std::sqrt(red + green + blue);
 }
 
-double relative_difference(std::span<const Float3> values, std::span<const Float3> reference,
-                           std::span<const float> area) {
+double area_distance(std::span<const Float3> values, std::span<const Float3> reference,
+                     std::span<const float> area) {
   assert(values.size() == reference.size() && values.size() == area.size());
   double sum = 0;
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -44,9 +44,15 @@ double relative_difference(std::span<const Float3> values, std::span<const Float
       sum += area[i] * d * d;
     }
   }
+  return std::sqrt(sum);
+}
+
+double relative_difference(std::span<const Float3> values, std::span<const Float3> reference,
+                           std::span<const float> area) {
+  const double distance = area_distance(values, reference, area);
   const double norm = area_norm(reference, area);
-  if (norm > 0) return std::sqrt(sum) / norm;
-  return sum > 0 ? std::numeric_limits<double>::infinity() : 0;
+  if (norm > 0) return distance / norm;
+  return distance > 0 ? std::numeric_limits<double>::infinity() : 0;
 }
 
 }  // namespace rebounce

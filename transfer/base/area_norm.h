@@ -18,6 +18,10 @@ std::array<double, kChannelCount> area_inner_product(std::span<const Float3> a,
 /// `values` and `area` [m²] have n entries each.
 double area_norm(std::span<const Float3> values, std::span<const float> area);
 
+/// |values - reference| in the area-weighted norm.
+double area_distance(std::span<const Float3> values, std::span<const Float3> reference,
+                     std::span<const float> area);
+
 /// |values - reference| / |reference| in the area-weighted norm. 0 if both are 0; infinite if only
 /// the reference is 0.
 double relative_difference(std::span<const Float3> values, std::span<const Float3> reference,

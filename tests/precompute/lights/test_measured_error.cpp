@@ -255,11 +255,12 @@ TEST(ErrorReference, ErrorsAreRelativeToWhatUsuallyArrives) {
   all.add(1e-5, 1e-5);
   EXPECT_EQ(all.reference(1), 1e-5);
   EXPECT_EQ(all.part(), 1);
-
-  const std::vector<float> area = {1, 1};
-  const std::vector<Float3> truth = {{3, 0, 0}, {0, 0, 0}}, values = {{3, 4, 0}, {0, 0, 0}};
-  EXPECT_EQ(received_error(values, truth, area, 3), relative_difference(values, truth, area));
-  EXPECT_NEAR(received_error(values, truth, area, 8), 0.5, 1e-12);
+  EXPECT_EQ(all.error(0, 1.5), 0.5);
+  EXPECT_NEAR(far.error(0, usual), 0.5, 1e-12);
+  ErrorReference none;
+  none.add(0, 0);
+  EXPECT_EQ(none.error(0, 0), 0);
+  EXPECT_TRUE(std::isinf(none.error(0, 1)));
 }
 
 TEST(RandomLights, AreTheSameForASeedAndOthersForAnother) {
