@@ -135,12 +135,7 @@ class LinkedOperator {
     check(decided_.form_factors.seed);
     const double finer = finer_tolerance(data_.record);
     if (finer > 0) make_again(finer);
-    report_.whole_error = clock_.run("check by rays", [&](const Progress& part) {
-      const auto transfer = [&](Exitances lights) { return solver_->nearly_exact(lights); };
-      return whole_->estimate(shown_patch, tracer_, transfer, part);
-    });
-    solver_.reset();
-    solved_.reset();
+    check_by_rays(shown_patch);
     if (decided_.store_links) report_.link_count = data_.links.pair.size();
     return std::move(errors_);
   }
@@ -216,6 +211,23 @@ class LinkedOperator {
     record_errors(decided_, errors_, data_.record);
   }
 
+  /// Measures the error of links and operator together, without the links: light of what is missing
+  /// spreads by the operator, or for one with roles by its compressed form factors.
+  void check_by_rays(std::span<const std::uint32_t> shown_patch) {
+    solver_.reset();
+    links_.reset();
+    if (roles_.all_are_both()) solved_.reset();
+    report_.whole_error = clock_.run("check by rays", [&](const Progress& part) {
+      const auto spread = [&](Exitances lights) {
+        return solved_ ? solved_->solved().indirect_irradiances(lights)
+                       : indirect_irradiances(*data_.transfer, lights);
+      };
+      return whole_->estimate(shown_patch, tracer_, spread, part);
+    });
+    whole_.reset();
+    solved_.reset();
+  }
+
   /// Makes the operator again from the bases that are there, for a smaller tolerance of the
   /// light, and checks it under lights that the first check has not seen.
   void make_again(double finer) {
@@ -229,7 +241,7 @@ class LinkedOperator {
     check(seed_of_second_check(decided_.form_factors.seed));
   }
 
-  const std::shared_ptr<const LinkedFormFactors> links_;
+  std::shared_ptr<const LinkedFormFactors> links_;  ///< until lights are checked
   const std::size_t link_count_;
   const RayTracer& tracer_;
   const BuildSettings& decided_;
@@ -240,7 +252,7 @@ class LinkedOperator {
   FittedLights lights_;  ///< while form factors are compressed
   WaitingLights waiting_;
   std::optional<MatrixFreeTransfer> solved_;
-  std::optional<CorrectedSolver> solver_;  ///< that the last check has used
+  std::optional<CorrectedSolver> solver_;  ///< while lights are checked
   std::optional<WholeErrorEstimator> whole_;
   std::vector<KindError> errors_;
 };

@@ -28,6 +28,18 @@ constexpr std::size_t kGathered = 8, kRows = kGathered * kChannelCount;
 
 }  // namespace
 
+Lights indirect_irradiances(const TransferOperator& transfer,
+                            std::span<const std::vector<Float3>> initial_exitances) {
+  Lights light;
+  for (const auto& m0 : initial_exitances) light.emplace_back(m0.size());
+  parallel_loop(
+      light.size(), 1, [&] { return std::vector<float>(transfer.workspace_size()); },
+      [&](std::size_t k, std::vector<float>& workspace) {
+        transfer.apply(initial_exitances[k], light[k], workspace);
+      });
+  return light;
+}
+
 CorrectedSolver::CorrectedSolver(const SolvedTransfer& compressed,
                                  std::shared_ptr<const LinkedFormFactors> links,
                                  const PatchTable& patches,
@@ -40,13 +52,7 @@ CorrectedSolver::CorrectedSolver(const SolvedTransfer& compressed,
 
 Lights CorrectedSolver::nearly_exact(std::span<const std::vector<Float3>> initial_exitances) const {
   if (nearly_inverse_ == nullptr) return compressed_.indirect_irradiances(initial_exitances);
-  Lights light(initial_exitances.size(), std::vector<Float3>(patches_.size()));
-  parallel_loop(
-      light.size(), 1, [&] { return std::vector<float>(nearly_inverse_->workspace_size()); },
-      [&](std::size_t k, std::vector<float>& workspace) {
-        nearly_inverse_->apply(initial_exitances[k], light[k], workspace);
-      });
-  return light;
+  return rebounce::indirect_irradiances(*nearly_inverse_, initial_exitances);
 }
 
 /// F times radiosities, along the links.

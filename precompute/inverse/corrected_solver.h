@@ -11,6 +11,11 @@
 
 namespace rebounce {
 
+/// The indirect irradiances [n] in lx of lights, given as initial exitances [n] in lx, by an
+/// operator. Threads share the lights.
+std::vector<std::vector<Float3>> indirect_irradiances(
+    const TransferOperator& transfer, std::span<const std::vector<Float3>> initial_exitances);
+
 /// Finds the light of links by iterative refinement (J. H. Wilkinson, "Rounding errors in algebraic
 /// processes", 1963). A first guess is off by some thousandths. One gather along the links tells
 /// the residual, and the nearly exact light of the residual is the correction. Each round takes the
@@ -39,9 +44,6 @@ class CorrectedSolver {
   Lights indirect_irradiances(std::span<const std::vector<Float3>> initial_exitances,
                               const Accuracy& accuracy) const;
 
-  /// The same, off by what guesses are.
-  Lights nearly_exact(std::span<const std::vector<Float3>> initial_exitances) const;
-
  private:
   /// A light that is still to be solved for.
   struct Open {
@@ -50,6 +52,7 @@ class CorrectedSolver {
     double guess_error;  ///< area norm of what the first round has changed
   };
 
+  Lights nearly_exact(std::span<const std::vector<Float3>> initial_exitances) const;
   Lights gather(const Lights& radiosities) const;
   Lights correct(std::span<const std::vector<Float3>> initial_exitances, const Lights& irradiances,
                  std::span<const Open> open) const;

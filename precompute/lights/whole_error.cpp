@@ -119,7 +119,6 @@ WholeErrorEstimator::WholeErrorEstimator(const TransferData& data, const PatchRo
   const std::size_t n = data.patches.size();
   for (std::size_t g = 0; g < kGroups; ++g) {
     patch_[g] = spread_choice(std::min(n, sample.patch_count), n, mix_bits(seed_ + g));
-    residual_[g].resize(patch_[g].size());
   }
 }
 
@@ -144,12 +143,7 @@ void WholeErrorEstimator::add(std::span<const Float3> initial_exitance,
   for (std::size_t i = 0; i < patches.size(); ++i) {
     for (int c = 0; c < kChannelCount; ++c) compression[i][c] -= received[i][c];
   }
-  for (std::size_t g = 0; g < kGroups; ++g) {
-    for (std::size_t k = 0; k < patch_[g].size(); ++k) {
-      const auto& [r, green, b] = truth[patch_[g][k]];
-      residual_[g][k].push_back({-r, -green, -b});
-    }
-  }
+  truth_.emplace_back(truth.begin(), truth.end());
 }
 
 /// The patches that the rays of each patch of a group met.
@@ -185,25 +179,46 @@ WholeErrorEstimator::MetRows WholeErrorEstimator::trace(std::size_t group,
 /// whose rays met it.
 WholeErrorEstimator::MetRows WholeErrorEstimator::met_by(std::size_t group, const MetRows& met,
                                                          std::span<const std::uint32_t> row) const {
-  MetRows by(met.size());
-  for (std::size_t k = 0; k < met.size(); ++k) {
-    for (const MetPatch& m : met[k]) {
-      if (row[m.patch] != kNone) by[row[m.patch]].push_back({patch_[group][k], m.count});
+  std::vector<std::size_t> count(met.size(), 0);
+  const auto for_each = [&](const auto& visit) {
+    for (std::size_t k = 0; k < met.size(); ++k) {
+      for (const MetPatch& m : met[k]) {
+        if (row[m.patch] != kNone) visit(row[m.patch], MetPatch{patch_[group][k], m.count});
+      }
     }
-  }
+  };
+  for_each([&](std::uint32_t of, const MetPatch&) { ++count[of]; });
+  MetRows by(met.size());
+  for (std::size_t k = 0; k < by.size(); ++k) by[k].reserve(count[k]);
+  for_each([&](std::uint32_t of, const MetPatch& m) { by[of].push_back(m); });
   return by;
 }
 
-/// Adds F B, as the rays of a group tell, to what `residual_` holds of it. Where both patches of a
-/// pair have rays, what either side says counts by the inverse of its variance, as in
+/// The light of the links with the other sign, [patches of a group][lights].
+std::vector<std::vector<Float3>> WholeErrorEstimator::without_gathered(std::size_t group) const {
+  std::vector<std::vector<Float3>> residual;
+  for (const std::uint32_t i : patch_[group]) {
+    std::vector<Float3>& of_patch = residual.emplace_back();
+    of_patch.reserve(truth_.size());
+    for (const std::vector<Float3>& truth : truth_) {
+      const auto& [r, g, b] = truth[i];
+      of_patch.push_back({-r, -g, -b});
+    }
+  }
+  return residual;
+}
+
+/// Finds the residual of a group: F B, as its rays tell, less the light of the links. Where both
+/// patches of a pair have rays, what either side says counts by the inverse of its variance, as in
 /// CountedExchange: the rays of a large patch hardly meet a small one.
-void WholeErrorEstimator::add_gathered(std::size_t group, const MetRows& met) {
+void WholeErrorEstimator::find_residual(std::size_t group, const MetRows& met) {
   const std::vector<float>& area = data_.patches.area;
   const std::size_t n = data_.patches.size();
   std::vector<std::uint32_t> row(n, kNone);
   for (std::uint32_t k = 0; k < met.size(); ++k) row[patch_[group][k]] = k;
   const MetRows by = met_by(group, met, row);
   const Ranks ranks;
+  residual_[group] = without_gathered(group);
   std::vector<Float3> by_patch;
   for (std::size_t first = 0; first < radiosity_.size(); first += kLightsGathered) {
     const std::size_t lights = std::min(kLightsGathered, radiosity_.size() - first);
@@ -228,15 +243,16 @@ void WholeErrorEstimator::add_gathered(std::size_t group, const MetRows& met) {
   ranks.share(std::span(residual_[group]));
 }
 
-/// Adds F B, as rays tell, to what `residual_` holds.
+/// Finds the residuals of all groups.
 void WholeErrorEstimator::gather(std::span<const std::uint32_t> shown_patch,
                                  const RayTracer& tracer, const Progress& progress) {
   for (std::size_t group = 0; group < kGroups; ++group) {
     const double begin = static_cast<double>(group) / kGroups;
     const Progress part = part_of(progress, begin, begin + 1.0 / kGroups);
-    add_gathered(group, trace(group, shown_patch, tracer, part));
+    find_residual(group, trace(group, shown_patch, tracer, part));
   }
-  radiosity_.clear();
+  radiosity_ = {};
+  truth_ = {};
 }
 
 /// What a group says of the residual, 0 at patches that are not in it.

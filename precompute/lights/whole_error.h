@@ -77,7 +77,8 @@ class WholeErrorEstimator {
   MetRows trace(std::size_t group, std::span<const std::uint32_t> shown_patch,
                 const RayTracer& tracer, const Progress& progress) const;
   MetRows met_by(std::size_t group, const MetRows& met, std::span<const std::uint32_t> row) const;
-  void add_gathered(std::size_t group, const MetRows& met);
+  std::vector<std::vector<Float3>> without_gathered(std::size_t group) const;
+  void find_residual(std::size_t group, const MetRows& met);
   void gather(std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
               const Progress& progress);
   std::vector<Float3> residual(std::size_t group, std::size_t light) const;
@@ -89,7 +90,7 @@ class WholeErrorEstimator {
   std::uint64_t seed_;
   int ray_count_;
   std::array<std::vector<std::uint32_t>, kGroups> patch_;  ///< of each group, ascending
-  std::vector<std::vector<Float3>> radiosity_;             ///< of each light, until rays are traced
+  std::vector<std::vector<Float3>> truth_, radiosity_;     ///< of each light, until rays are traced
   std::vector<std::vector<Float3>>
       compression_;  ///< of each light: operator less links, at receivers
   std::array<std::vector<std::vector<Float3>>, kGroups> residual_;  ///< [group][patch][light]
