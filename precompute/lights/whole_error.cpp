@@ -24,6 +24,9 @@ constexpr double kStudent = 3.182;
 // Rays of a group, and of a patch of it (lab/111, lab/133).
 constexpr double kRaysOfGroup = 1 << 23, kLeastRays = 512, kMostRays = 4096;
 
+// Pieces that the rays of a group are traced in: what they meet takes the most memory.
+constexpr std::size_t kPieces = 8;
+
 // Lights that are gathered together: those of all patches stay in the last cache.
 constexpr std::size_t kLightsGathered = 32;
 
@@ -146,15 +149,16 @@ void WholeErrorEstimator::add(std::span<const Float3> initial_exitance,
   truth_.emplace_back(truth.begin(), truth.end());
 }
 
-/// The patches that the rays of each patch of a group met.
-WholeErrorEstimator::MetRows WholeErrorEstimator::trace(std::size_t group,
+/// The patches that the rays of the patches [begin, end) of a group met.
+WholeErrorEstimator::MetRows WholeErrorEstimator::trace(std::size_t group, std::size_t begin,
+                                                        std::size_t end,
                                                         std::span<const std::uint32_t> shown_patch,
                                                         const RayTracer& tracer,
                                                         const Progress& progress) const {
-  const std::size_t n = data_.patches.size(), rows = patch_[group].size();
+  const std::size_t n = data_.patches.size(), rows = end - begin;
   const PatchTriangles triangles(data_.mesh.triangle_patch, n);
   const Ranks ranks;
-  MetRows met(rows);
+  MetRows met{begin, std::vector<std::vector<MetPatch>>(rows)};
   ParallelProgress loop(progress, rows);
   struct Scratch {
     EscapeScratch escape;
@@ -164,31 +168,31 @@ WholeErrorEstimator::MetRows WholeErrorEstimator::trace(std::size_t group,
       rows, 16, [] { return Scratch(); },
       [&](std::size_t k, Scratch& scratch) {
         if (loop.stopped() || !ranks.makes(k)) return;
-        const std::uint32_t i = patch_[group][k];
+        const std::uint32_t i = patch_[group][begin + k];
         measure_escape(data_.mesh, shown_patch, triangles[i], i, tracer, ray_count_,
                        mix_bits(seed_ + kGroups + group), scratch.escape);
-        met[k] = scratch.counter.count(n, scratch.escape.met);
+        met.patch[k] = scratch.counter.count(n, scratch.escape.met);
         loop.advance();
       });
   loop.finish();
-  ranks.share(std::span(met));
+  ranks.share(std::span(met.patch));
   return met;
 }
 
-/// What `met` [rows] says from the other side: for each patch of a group, the patches of the group
-/// whose rays met it.
-WholeErrorEstimator::MetRows WholeErrorEstimator::met_by(std::size_t group, const MetRows& met,
-                                                         std::span<const std::uint32_t> row) const {
-  std::vector<std::size_t> count(met.size(), 0);
+/// What `met` says from the other side: for each patch of a group, the patches whose rays met it.
+std::vector<std::vector<MetPatch>> WholeErrorEstimator::met_by(
+    std::size_t group, const MetRows& met, std::span<const std::uint32_t> row) const {
+  std::vector<std::size_t> count(patch_[group].size(), 0);
   const auto for_each = [&](const auto& visit) {
-    for (std::size_t k = 0; k < met.size(); ++k) {
-      for (const MetPatch& m : met[k]) {
-        if (row[m.patch] != kNone) visit(row[m.patch], MetPatch{patch_[group][k], m.count});
+    for (std::size_t k = 0; k < met.patch.size(); ++k) {
+      const std::uint32_t i = patch_[group][met.begin + k];
+      for (const MetPatch& m : met.patch[k]) {
+        if (row[m.patch] != kNone) visit(row[m.patch], MetPatch{i, m.count});
       }
     }
   };
   for_each([&](std::uint32_t of, const MetPatch&) { ++count[of]; });
-  MetRows by(met.size());
+  std::vector<std::vector<MetPatch>> by(count.size());
   for (std::size_t k = 0; k < by.size(); ++k) by[k].reserve(count[k]);
   for_each([&](std::uint32_t of, const MetPatch& m) { by[of].push_back(m); });
   return by;
@@ -208,17 +212,16 @@ std::vector<std::vector<Float3>> WholeErrorEstimator::without_gathered(std::size
   return residual;
 }
 
-/// Finds the residual of a group: F B, as its rays tell, less the light of the links. Where both
-/// patches of a pair have rays, what either side says counts by the inverse of its variance, as in
+/// Adds F B, as some rays of a group tell, to what `residual_` holds of it. Where both patches of a
+/// pair have rays, what either side says counts by the inverse of its variance, as in
 /// CountedExchange: the rays of a large patch hardly meet a small one.
-void WholeErrorEstimator::find_residual(std::size_t group, const MetRows& met) {
+void WholeErrorEstimator::add_gathered(std::size_t group, const MetRows& met) {
   const std::vector<float>& area = data_.patches.area;
   const std::size_t n = data_.patches.size();
   std::vector<std::uint32_t> row(n, kNone);
-  for (std::uint32_t k = 0; k < met.size(); ++k) row[patch_[group][k]] = k;
-  const MetRows by = met_by(group, met, row);
+  for (std::uint32_t k = 0; k < patch_[group].size(); ++k) row[patch_[group][k]] = k;
+  const std::vector<std::vector<MetPatch>> by = met_by(group, met, row);
   const Ranks ranks;
-  residual_[group] = without_gathered(group);
   std::vector<Float3> by_patch;
   for (std::size_t first = 0; first < radiosity_.size(); first += kLightsGathered) {
     const std::size_t lights = std::min(kLightsGathered, radiosity_.size() - first);
@@ -227,7 +230,7 @@ void WholeErrorEstimator::find_residual(std::size_t group, const MetRows& met) {
       for (std::size_t i = 0; i < n; ++i) by_patch[i * lights + l] = radiosity_[first + l][i];
     }
 #pragma omp parallel for schedule(dynamic, 16)
-    for (std::size_t k = 0; k < met.size(); ++k) {
+    for (std::size_t k = 0; k < by.size(); ++k) {
       if (!ranks.makes(k)) continue;
       const std::uint32_t i = patch_[group][k];
       const auto sum = std::span(residual_[group][k]).subspan(first, lights);
@@ -236,20 +239,31 @@ void WholeErrorEstimator::find_residual(std::size_t group, const MetRows& met) {
                part * static_cast<float>(m.count) / static_cast<float>(ray_count_));
       };
       const auto share = [&](std::uint32_t j) { return area[j] / (area[i] + area[j]); };
-      for (const MetPatch& m : met[k]) add(m, row[m.patch] == kNone ? 1 : share(m.patch));
+      if (k >= met.begin && k < met.end()) {
+        for (const MetPatch& m : met.patch[k - met.begin]) {
+          add(m, row[m.patch] == kNone ? 1 : share(m.patch));
+        }
+      }
       for (const MetPatch& m : by[k]) add(m, share(m.patch));
     }
   }
-  ranks.share(std::span(residual_[group]));
 }
 
-/// Finds the residuals of all groups.
+/// Finds the residuals of all groups: F B, as rays tell, less the light of the links.
 void WholeErrorEstimator::gather(std::span<const std::uint32_t> shown_patch,
                                  const RayTracer& tracer, const Progress& progress) {
+  constexpr double kAll = kGroups * kPieces;
+  const Ranks ranks;
   for (std::size_t group = 0; group < kGroups; ++group) {
-    const double begin = static_cast<double>(group) / kGroups;
-    const Progress part = part_of(progress, begin, begin + 1.0 / kGroups);
-    find_residual(group, trace(group, shown_patch, tracer, part));
+    residual_[group] = without_gathered(group);
+    const std::size_t rows = patch_[group].size();
+    for (std::size_t piece = 0; piece < kPieces; ++piece) {
+      const double done = static_cast<double>(group * kPieces + piece);
+      const Progress part = part_of(progress, done / kAll, (done + 1) / kAll);
+      add_gathered(group, trace(group, piece * rows / kPieces, (piece + 1) * rows / kPieces,
+                                shown_patch, tracer, part));
+    }
+    ranks.share(std::span(residual_[group]));
   }
   radiosity_ = {};
   truth_ = {};

@@ -71,14 +71,20 @@ class WholeErrorEstimator {
     double of_compression = 0;
   };
 
-  /// Of each patch of a group.
-  using MetRows = std::vector<std::vector<MetPatch>>;
+  /// What rays of some patches of a group met.
+  struct MetRows {
+    std::size_t begin;                         ///< the first of the patches
+    std::vector<std::vector<MetPatch>> patch;  ///< of each of them
+    std::size_t end() const { return begin + patch.size(); }
+  };
 
-  MetRows trace(std::size_t group, std::span<const std::uint32_t> shown_patch,
-                const RayTracer& tracer, const Progress& progress) const;
-  MetRows met_by(std::size_t group, const MetRows& met, std::span<const std::uint32_t> row) const;
+  MetRows trace(std::size_t group, std::size_t begin, std::size_t end,
+                std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
+                const Progress& progress) const;
+  std::vector<std::vector<MetPatch>> met_by(std::size_t group, const MetRows& met,
+                                            std::span<const std::uint32_t> row) const;
   std::vector<std::vector<Float3>> without_gathered(std::size_t group) const;
-  void find_residual(std::size_t group, const MetRows& met);
+  void add_gathered(std::size_t group, const MetRows& met);
   void gather(std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
               const Progress& progress);
   std::vector<Float3> residual(std::size_t group, std::size_t light) const;
