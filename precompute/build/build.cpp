@@ -124,18 +124,18 @@ class TransferBuild {
     const bool operator_of_links = links && decided_.operator_kind != OperatorKind::kNoOperator;
     EscapedLight escaped =
         links ? find_linked() : find_pairs(model_, tracer(), decided_, data_, report_, clock_);
+    model_.patches.sky_visibility = std::move(escaped.sky_visibility);
+    model_.patches.absorbed = std::move(escaped.absorbed);
     if (operator_of_links) {
       LinkedBuild build =
           linked_build(built_scene(model_, decided_), report_.link_count, links_->bytes(),
-                       model_.patches.reflectance, roles_, kCompressionPart * decided_.tolerance);
+                       model_.patches, roles_, kCompressionPart * decided_.tolerance);
       std::uint64_t& limit = decided_.memory_limit_bytes;
       announce(report_.estimate_after_links.emplace(estimate_after_links(build, limit)));
       thread_limit_.emplace(thread_count_after_links(build, limit));
       limit -= std::min(limit - 1, build.held_bytes);  // what is left for the other stages
     }
     data_.patches = std::move(model_.patches);
-    data_.patches.sky_visibility = std::move(escaped.sky_visibility);
-    data_.patches.absorbed = std::move(escaped.absorbed);
     data_.sky_cells = std::move(escaped.sky_cells);
     data_.mesh = std::move(model_.mesh);
     make_outputs(model_.shown_patch, *tracer_, decided_, data_, report_, clock_);

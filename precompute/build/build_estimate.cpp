@@ -55,8 +55,8 @@ constexpr std::size_t kLinkBytesFound = 60;
 constexpr std::size_t kPatchBytesOfLinks = 11'500;
 
 // A link afterwards: what gathers along it, twice, where some seven links of ten have no gradients
-// (lab/169).
-constexpr std::size_t kLinkBytesKept = 25;
+// (lab/169), and compressed form factors, which grow with links (lab/177).
+constexpr std::size_t kLinkBytesKept = 46;
 
 // How many more links there are once those that are too coarse have been made finer, as a part of
 // those that are forecast: between none and 1.4 times, by the scene. What is said lies in between
@@ -70,9 +70,8 @@ constexpr double kPatchesOfSquare = 2;
 // More patches than any build has room for.
 constexpr double kNoRoom = 1e15;
 
-// A patch beside links, with its compressed form factors, up to as many entries as there are pairs
-// (lab/169).
-constexpr std::size_t kPatchBytes = 9000, kPatchBytesOfPair = 2;
+// What else a patch takes of compressed form factors, for each patch up to a limit (lab/177).
+constexpr double kPatchBytes = 3200, kPatchBytesOfPatch = 0.23;
 
 std::string in_gib(std::uint64_t bytes) {
   return fmt::format("{:.3g} GiB", static_cast<double>(bytes) / (1ULL << 30));
@@ -102,14 +101,10 @@ double least_patch_count(const Scene& scene, const SubdivisionSettings& settings
 }
 
 std::uint64_t bytes_beside_transfer(const LinkedBuild& build) {
-  const std::size_t n = build.scene.patch_count;
-  return build.held_bytes + std::min(kPatchBytes, kPatchBytesOfPair * n) * n +
+  const auto n = static_cast<double>(build.scene.patch_count);
+  const double form_factors = std::min(kPatchBytes, kPatchBytesOfPatch * n) * n;
+  return build.held_bytes + static_cast<std::uint64_t>(form_factors) +
          kLinkBytesKept * build.link_count;
-}
-
-std::uint64_t peak_bytes_of_form_factors(const LinkedBuild& build) {
-  return build.held_bytes + kLinkBytesKept * build.link_count +
-         form_factor_compression_bytes(build.scene.patch_count);
 }
 
 std::uint64_t bytes_of_libraries(std::size_t patch_count) {
@@ -125,7 +120,10 @@ MatrixFreeTransferPlan plan_after_links(const LinkedBuild& build, std::uint64_t 
   MatrixFreeTransferSettings settings{.compression = {.tolerance = build.tolerance},
                                       .roles = build.roles};
   settings.memory_limit_bytes = memory_of_matrix_free_transfer(build, limit_bytes);
-  return plan_matrix_free_transfer(build.scene.patch_count, build.matrix_count, settings);
+  return plan_matrix_free_transfer({.patch_count = build.scene.patch_count,
+                                    .matrix_count = build.matrix_count,
+                                    .open_part = build.open_part},
+                                   settings);
 }
 
 std::uint64_t bytes_of_weights(const BuiltScene& scene) {
@@ -161,12 +159,15 @@ BuiltScene built_scene(const PatchModel& model, const BuildSettings& decided) {
 }
 
 LinkedBuild linked_build(const BuiltScene& scene, std::size_t link_count, std::uint64_t link_bytes,
-                         std::span<const Float3> reflectance, const PatchRoles& roles,
-                         double tolerance) {
+                         const PatchTable& patches, const PatchRoles& roles, double tolerance) {
   const std::uint64_t held = resident_memory_bytes();
-  return {scene,      held - std::min(held, link_bytes),
-          link_count, distinct_channels(reflectance),
-          roles,      tolerance};
+  return {.scene = scene,
+          .held_bytes = held - std::min(held, link_bytes),
+          .link_count = link_count,
+          .matrix_count = distinct_channels(patches.reflectance),
+          .roles = roles,
+          .tolerance = tolerance,
+          .open_part = mean_open_part(patches.sky_visibility)};
 }
 
 PairsBuild pairs_build(const BuiltScene& scene, std::size_t matrix_count,
@@ -207,9 +208,9 @@ std::uint64_t peak_bytes_of_links(const LinkedBuild& build) {
 }
 
 std::uint64_t peak_bytes_after_links(const LinkedBuild& build, std::uint64_t limit_bytes) {
-  const std::uint64_t beside = std::max({plan_after_links(build, limit_bytes).peak_bytes,
-                                         bytes_of_weights(build.scene), build.scene.row_bytes});
-  return std::max(peak_bytes_of_form_factors(build), bytes_beside_transfer(build) + beside);
+  return bytes_beside_transfer(build) +
+         std::max({plan_after_links(build, limit_bytes).peak_bytes, bytes_of_weights(build.scene),
+                   build.scene.row_bytes});
 }
 
 int thread_count_after_links(const LinkedBuild& build, std::uint64_t limit_bytes) {
@@ -234,9 +235,8 @@ CostEstimate estimate_cost(const PatchModel& model, const PatchRoles& roles,
     estimate.peak_bytes = peak_bytes_of_pairs(pairs_build(model, decided));
     return estimate;
   }
-  const LinkedBuild build =
-      linked_build(built_scene(model, decided), link_count, 0, model.patches.reflectance, roles,
-                   kCompressionPart * decided.tolerance);
+  const LinkedBuild build = linked_build(built_scene(model, decided), link_count, 0, model.patches,
+                                         roles, kCompressionPart * decided.tolerance);
   estimate.peak_bytes = peak_bytes_of_links(build);
   if (decided.operator_kind != OperatorKind::kNoOperator) {
     estimate.peak_bytes =

@@ -59,12 +59,12 @@ struct LinkedBuild {
   std::uint32_t matrix_count = 1;  ///< distinct reflectance channels
   PatchRoles roles{};
   double tolerance = kDefaultTolerance;  ///< of the operator
+  double open_part = 0;                  ///< of MatrixFreeTransferSize
 };
 
 /// Of a model of which links take `link_bytes` of the memory at present.
 LinkedBuild linked_build(const BuiltScene& scene, std::size_t link_count, std::uint64_t link_bytes,
-                         std::span<const Float3> reflectance, const PatchRoles& roles,
-                         double tolerance);
+                         const PatchTable& patches, const PatchRoles& roles, double tolerance);
 
 /// Peak memory of the process while links are found.
 std::uint64_t peak_bytes_of_links(const LinkedBuild& build);

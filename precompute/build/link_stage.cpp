@@ -69,8 +69,8 @@ std::uint64_t bytes_of_finer(const PatchModel& model, const PatchRoles& roles,
       static_cast<double>(found.form_factors->link_count()) * std::pow(step, -kCountPower);
   const LinkedBuild build =
       linked_build(built_scene(model.patches.size(), model.mesh), static_cast<std::size_t>(finer),
-                   builder.held_bytes() + found.form_factors->bytes(), model.patches.reflectance,
-                   roles, kCompressionPart * decided.tolerance);
+                   builder.held_bytes() + found.form_factors->bytes(), model.patches, roles,
+                   kCompressionPart * decided.tolerance);
   return std::max(peak_bytes_of_links(build),
                   peak_bytes_after_links(build, decided.memory_limit_bytes));
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string>
 
 #include "precompute/compression/block_tree.h"
@@ -16,60 +17,75 @@
 namespace rebounce {
 namespace {
 
-// Bytes per patch, for each matrix, of bases and the rounds of the search, and couplings in rooms,
-// as measured (lab/114, lab/156, lab/169). They hold at the default tolerance and grow with this
-// power of 1 / tolerance.
-constexpr double kOperatorBytes = 6.0e3, kRoomCouplings = 450, kOperatorGrowth = 0.4;
+// Of a patch and a matrix: bases, and couplings as in rooms; they hold at the default tolerance and
+// grow with this power of 1 / tolerance (lab/114, lab/177).
+constexpr double kOperatorBytes = 3.0e3, kRoomCouplings = 450, kOperatorGrowth = 0.4;
 
 // Bytes of a coupling (pack_couplings), with what more vectors than in rooms take (lab/156).
 constexpr double kCouplingBytes = 1.3;
+
+// Of a patch: the lights, with their norms and what is tried of them (lab/177). Where the sky is
+// open, lamps light fewer patches and fewer exchange light.
+constexpr double kPatchBytes = kFittingLightBytes + 1200, kLessIfOpen = 0.5;
+
+// What libraries take, and each thread but the first (lab/177).
+constexpr std::size_t kLibraryBytes = 5'900'000, kThreadBytes = 1'500'000;
+
+// An entry of a piece while it is compressed: in doubles, and as it was (lab/177).
+constexpr std::size_t kPieceEntryBytes = sizeof(double) + sizeof(float);
+
+// What lights take less of a patch while vectors are solved for than in the search (lab/177).
+constexpr std::size_t kLessWhileSolving = 5000;
 
 // Of a patch and a matrix while a dense operator is compressed, beside the lights: candidates of
 // the search (lab/174).
 constexpr std::size_t kSearchBytes = 1500;
 
-// Of OpenBLAS, for all threads but the first, each as far as its products fill it (lab/162,
-// lab/173).
-std::size_t blas_bytes(std::size_t patch_count, std::size_t thread_count) {
-  constexpr std::size_t kOfPatch = 6'000, kMost = 12'000'000;
-  return (thread_count - 1) * std::min(kMost, kOfPatch * patch_count);
+/// Memory of threads that compress pieces of the operator, each its own.
+std::size_t bytes_of_pieces(const MatrixFreeTransferSize& size, std::size_t threads) {
+  const auto positions =
+      static_cast<std::uint32_t>(HierarchicalFormat::position_count(size.patch_count));
+  const std::size_t side = std::min(largest_piece(positions), positions);
+  const std::size_t along = side > 0 ? (positions + side - 1) / side : 0;
+  const std::size_t pieces = along * (along + 1) / 2;
+  return std::min(threads, pieces) * side * side * size.matrix_count * kPieceEntryBytes;
 }
 
-// Of blocks that are at work while an operator is compressed (lab/114, lab/173).
-std::size_t work_bytes(std::size_t patch_count) {
-  constexpr std::size_t kOfPatch = 14'000, kMost = 8'000'000;
-  return std::min(kMost, kOfPatch * patch_count);
+/// Memory of threads that solve, beyond what the search takes anyway.
+std::size_t bytes_of_solves(const MatrixFreeTransferSize& size, std::size_t threads) {
+  constexpr std::size_t kVectors = 9;  // what is sent, those of the solver, coefficients
+  constexpr std::size_t kOfThread = kVectors * SolvedTransfer::kBatchColumns * sizeof(float);
+  return size.patch_count * (std::max(threads * kOfThread, kLessWhileSolving) - kLessWhileSolving);
 }
 
 }  // namespace
 
-MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::size_t matrix_count,
-                                                 const MatrixFreeTransferSettings& settings,
-                                                 std::uint64_t coupling_count) {
+double mean_open_part(std::span<const float> sky_visibility) {
+  const double sum = std::accumulate(sky_visibility.begin(), sky_visibility.end(), 0.0);
+  return sky_visibility.empty() ? 0 : sum / static_cast<double>(sky_visibility.size());
+}
+
+MatrixFreeTransferPlan plan_matrix_free_transfer(const MatrixFreeTransferSize& size,
+                                                 const MatrixFreeTransferSettings& settings) {
   constexpr std::size_t kGroupsOfThread = 4;  // of a run, so that all threads end together
-  constexpr std::size_t kVectors = 9;         // what is sent, those of the solver, coefficients
-  constexpr std::size_t kBatchColumns = SolvedTransfer::kBatchColumns;
-  const std::size_t group = kVectors * patch_count * kBatchColumns * sizeof(float);
-  const std::size_t side =
-      largest_piece(static_cast<std::uint32_t>(HierarchicalFormat::position_count(patch_count)));
-  // What is compressed of a piece is held in doubles too, but before the operator is whole
-  // (lab/114).
-  const std::size_t piece = side * side * matrix_count * sizeof(float);
+  const auto patches = static_cast<double>(size.patch_count);
   const std::uint64_t limit = settings.memory_limit_bytes;
-  const double rows = static_cast<double>(patch_count * matrix_count) *
-                      wanted_part(settings.roles, patch_count) *
+  const double rows = patches * static_cast<double>(size.matrix_count) *
+                      wanted_part(settings.roles, size.patch_count) *
                       std::pow(kDefaultTolerance / settings.compression.tolerance, kOperatorGrowth);
-  const double couplings = std::max(kRoomCouplings * rows, static_cast<double>(coupling_count));
-  const std::size_t kept =
-      patch_count * kFittingLightBytes + work_bytes(patch_count) +
-      static_cast<std::size_t>(kOperatorBytes * rows + kCouplingBytes * couplings);
+  const double couplings =
+      std::max(kRoomCouplings * rows, static_cast<double>(size.coupling_count));
+  const double kept =
+      (1 - kLessIfOpen * size.open_part) * (kPatchBytes * patches + kOperatorBytes * rows) +
+      kCouplingBytes * couplings;
 
   MatrixFreeTransferPlan plan;
   for (plan.thread_count = omp_get_max_threads();; --plan.thread_count) {
     const auto threads = static_cast<std::size_t>(plan.thread_count);
-    plan.cell_count = (kGroupsOfThread * threads + matrix_count - 1) / matrix_count;
-    plan.peak_bytes =
-        std::max(threads * group, threads * piece) + blas_bytes(patch_count, threads) + kept;
+    plan.cell_count = (kGroupsOfThread * threads + size.matrix_count - 1) / size.matrix_count;
+    plan.peak_bytes = static_cast<std::size_t>(kept) + kLibraryBytes +
+                      (threads - 1) * kThreadBytes +
+                      std::max(bytes_of_pieces(size, threads), bytes_of_solves(size, threads));
     if (limit == 0 || plan.peak_bytes <= limit || threads == 1) return plan;
   }
 }
@@ -86,15 +102,6 @@ std::uint64_t dense_compression_peak_bytes(std::size_t patch_count, std::size_t 
          std::max(wide * std::min(kOfPiece * patch_count, kMostOfPiece),
                   patch_count * (kFittingLightBytes + kSearchBytes * matrix_count)) +
          others * wide * std::min(kOfThread * patch_count, kMostOfThread);
-}
-
-std::uint64_t form_factor_compression_bytes(std::size_t patch_count) {
-  // Candidates of the search, up to as many entries as there are pairs (lab/167).
-  constexpr std::size_t kOfPair = 7, kOfPatch = 14'700, kAtLeast = 53'000'000;
-  const std::size_t candidates =
-      std::min(kOfPair * patch_count * patch_count, kAtLeast + kOfPatch * patch_count);
-  const auto threads = static_cast<std::size_t>(omp_get_max_threads());
-  return kFittingLightBytes * patch_count + candidates + blas_bytes(patch_count, threads);
 }
 
 /// Throws Error if there is a memory limit and a plan does not fit into it.

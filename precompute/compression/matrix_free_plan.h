@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <span>
 
 #include "precompute/compression/hierarchical_settings.h"
 #include "transfer/data/patch_roles.h"
@@ -31,18 +32,26 @@ struct MatrixFreeTransferPlan {
   std::size_t peak_bytes = 0;
 };
 
+/// What the memory of an operator depends on, beside its settings.
+struct MatrixFreeTransferSize {
+  std::size_t patch_count = 0;
+  std::size_t matrix_count = 1;  ///< distinct reflectance channels
+  /// The part of the hemispheres over patches, on average, that is open to the sky.
+  double open_part = 0;
+  /// Once bases are known; a plan is for as many as in rooms at the least.
+  std::uint64_t coupling_count = 0;
+};
+
 /// The plan with the most threads, at most those of OpenMP, that keeps to the limit of `settings`.
-/// Only a plan with one thread may be above the limit: no plan takes less. `coupling_count`: the
-/// number of couplings, once bases are known; the plan is for as many as in rooms at the least.
-MatrixFreeTransferPlan plan_matrix_free_transfer(std::size_t patch_count, std::size_t matrix_count,
-                                                 const MatrixFreeTransferSettings& settings = {},
-                                                 std::uint64_t coupling_count = 0);
+/// Only a plan with one thread may be above the limit: no plan takes less.
+MatrixFreeTransferPlan plan_matrix_free_transfer(const MatrixFreeTransferSize& size,
+                                                 const MatrixFreeTransferSettings& settings = {});
+
+/// The mean of `sky_visibility` [n]; 0 where there is none.
+double mean_open_part(std::span<const float> sky_visibility);
 
 /// Peak memory of compressing a dense operator (f32) to a hierarchical one, with the dense one.
 std::uint64_t dense_compression_peak_bytes(std::size_t patch_count, std::size_t matrix_count);
-
-/// Memory of compressing form factors from links, beside the links.
-std::uint64_t form_factor_compression_bytes(std::size_t patch_count);
 
 /// Throws Error if the plan for so many patches is above the limit of `settings`.
 void check_memory(std::size_t patch_count, const MatrixFreeTransferPlan& plan,

@@ -55,8 +55,12 @@ HierarchicalStorage coarser(const HierarchicalOperator& form_factors, const Patc
 MatrixFreeTransferPlan checked_plan(const PatchTable& patches,
                                     const MatrixFreeTransferSettings& settings,
                                     std::uint64_t couplings = 0) {
-  const MatrixFreeTransferPlan plan = plan_matrix_free_transfer(
-      patches.size(), distinct_channels(patches.reflectance), settings, couplings);
+  const MatrixFreeTransferPlan plan =
+      plan_matrix_free_transfer({.patch_count = patches.size(),
+                                 .matrix_count = distinct_channels(patches.reflectance),
+                                 .open_part = mean_open_part(patches.sky_visibility),
+                                 .coupling_count = couplings},
+                                settings);
   check_memory(patches.size(), plan, settings);
   return plan;
 }

@@ -302,9 +302,9 @@ TEST(MatrixFreeTransfer, SameBitsForAnyNumberOfThreadsAndAnyMemory) {
   const auto one = build(room);
   omp_set_num_threads(6);
   const MatrixFreeTransferPlan free =
-      plan_matrix_free_transfer(room.patches.size(), 1, {.compression = kCoarse});
+      plan_matrix_free_transfer({room.patches.size()}, {.compression = kCoarse});
   const MatrixFreeTransferPlan least = plan_matrix_free_transfer(
-      room.patches.size(), 1, {.compression = kCoarse, .memory_limit_bytes = 1});
+      {room.patches.size()}, {.compression = kCoarse, .memory_limit_bytes = 1});
   ASSERT_GT(room.patches.size(), 1024U) << "not four cells";
   ASSERT_EQ(free.cell_count, 24U);
   ASSERT_EQ(least.cell_count, 4U);
@@ -322,8 +322,8 @@ TEST(MatrixFreeTransfer, MoreThreadsForMoreMemory) {
   const int before = omp_get_max_threads();
   omp_set_num_threads(16);
   for (const std::size_t matrices : {1U, 3U}) {
-    const MatrixFreeTransferPlan free = plan_matrix_free_transfer(65536, matrices),
-                                 least = plan_matrix_free_transfer(65536, matrices,
+    const MatrixFreeTransferPlan free = plan_matrix_free_transfer({65536, matrices}),
+                                 least = plan_matrix_free_transfer({65536, matrices},
                                                                    {.memory_limit_bytes = 1});
     EXPECT_EQ(free.thread_count, 16);
     EXPECT_GE(free.cell_count * matrices, 64U) << "not enough vectors for all threads";
@@ -332,7 +332,7 @@ TEST(MatrixFreeTransfer, MoreThreadsForMoreMemory) {
     int narrowed = 0;
     for (std::size_t limit = least.peak_bytes; limit < free.peak_bytes; limit += 100 << 20) {
       const MatrixFreeTransferPlan plan =
-          plan_matrix_free_transfer(65536, matrices, {.memory_limit_bytes = limit});
+          plan_matrix_free_transfer({65536, matrices}, {.memory_limit_bytes = limit});
       EXPECT_LE(plan.peak_bytes, limit);
       EXPECT_GE(plan.thread_count, last.thread_count);
       narrowed += plan.thread_count > 1 ? 1 : 0;
@@ -403,7 +403,7 @@ TEST(MatrixFreeTransfer, StopsWhenAsked) {
 TEST(MatrixFreeTransfer, RefusesWhatItCannotDo) {
   const Room& room = small_room();
   MatrixFreeTransferSettings settings{.compression = kCoarse, .memory_limit_bytes = 1};
-  const std::size_t least = plan_matrix_free_transfer(room.patches.size(), 1, settings).peak_bytes;
+  const std::size_t least = plan_matrix_free_transfer({room.patches.size()}, settings).peak_bytes;
   settings.memory_limit_bytes = least - 1;
   const auto attempt = [&] {
     build_matrix_free_transfer(*room.form_factors, room.patches, room.lights(), settings);
@@ -417,33 +417,35 @@ TEST(MatrixFreeTransfer, RefusesWhatItCannotDo) {
 }
 
 TEST(MatrixFreeTransfer, TakesMemoryInProportionToThePatches) {
-  const double at_64k = static_cast<double>(plan_matrix_free_transfer(65536, 3).peak_bytes);
-  EXPECT_NEAR(static_cast<double>(plan_matrix_free_transfer(131072, 3).peak_bytes) / at_64k, 2,
+  const double at_64k = static_cast<double>(plan_matrix_free_transfer({65536, 3}).peak_bytes);
+  EXPECT_NEAR(static_cast<double>(plan_matrix_free_transfer({131072, 3}).peak_bytes) / at_64k, 2,
               0.3);
-  EXPECT_LT(plan_matrix_free_transfer(2000, 1).peak_bytes,
-            plan_matrix_free_transfer(4000, 1).peak_bytes);
+  EXPECT_LT(plan_matrix_free_transfer({2000, 1}).peak_bytes,
+            plan_matrix_free_transfer({4000, 1}).peak_bytes);
+  EXPECT_LT(plan_matrix_free_transfer({4000, 1, 0.5}).peak_bytes,
+            plan_matrix_free_transfer({4000, 1}).peak_bytes);
   // A finer operator takes more, one over a quarter of the patches less, but as many lights.
   PatchRoles quarter;
   for (std::size_t i = 0; i < 4000; ++i) quarter.role.push_back(i % 4 == 0 ? PatchRoles::kBoth : 0);
   const MatrixFreeTransferSettings fine{.compression = {.tolerance = 0.001}},
       part{.roles = quarter};
-  const std::size_t usual = plan_matrix_free_transfer(4000, 3).peak_bytes;
-  EXPECT_GT(plan_matrix_free_transfer(4000, 3, fine).peak_bytes, usual * 5 / 4);
-  EXPECT_LT(plan_matrix_free_transfer(4000, 3, part).peak_bytes, usual * 3 / 4);
-  EXPECT_GT(plan_matrix_free_transfer(4000, 3, part).peak_bytes, usual / 4);
+  const std::size_t usual = plan_matrix_free_transfer({4000, 3}).peak_bytes;
+  EXPECT_GT(plan_matrix_free_transfer({4000, 3}, fine).peak_bytes, usual * 5 / 4);
+  EXPECT_LT(plan_matrix_free_transfer({4000, 3}, part).peak_bytes, usual * 3 / 4);
+  EXPECT_GT(plan_matrix_free_transfer({4000, 3}, part).peak_bytes, usual / 4);
 }
 
 TEST(MatrixFreeTransfer, TakesMoreMemoryForMoreCouplingsThanInRooms) {
   constexpr std::size_t kPatches = 65536;
   constexpr std::uint64_t kFew = 1'000'000, kMany = 4'000'000'000;
-  const std::size_t usual = plan_matrix_free_transfer(kPatches, 3, {}, kFew).peak_bytes;
-  EXPECT_EQ(plan_matrix_free_transfer(kPatches, 3).peak_bytes, usual);
-  const MatrixFreeTransferPlan many = plan_matrix_free_transfer(kPatches, 3, {}, kMany);
+  const std::size_t usual = plan_matrix_free_transfer({kPatches, 3, 0, kFew}).peak_bytes;
+  EXPECT_EQ(plan_matrix_free_transfer({kPatches, 3}).peak_bytes, usual);
+  const MatrixFreeTransferPlan many = plan_matrix_free_transfer({kPatches, 3, 0, kMany});
   EXPECT_GT(many.peak_bytes, usual + kMany / 2);
   EXPECT_LT(many.peak_bytes, usual + 2 * kMany);
   const MatrixFreeTransferSettings limited{.memory_limit_bytes = usual};
   test::expect_error([&] { check_memory(kPatches, many, limited); }, "raise the memory limit");
-  EXPECT_EQ(plan_matrix_free_transfer(kPatches, 3, limited, kMany).thread_count, 1);
+  EXPECT_EQ(plan_matrix_free_transfer({kPatches, 3, 0, kMany}, limited).thread_count, 1);
 }
 
 }  // namespace
