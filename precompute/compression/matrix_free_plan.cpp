@@ -29,7 +29,7 @@ constexpr double kCouplingBytes = 1.3;
 constexpr double kPatchBytes = kFittingLightBytes + 1200, kLessIfOpen = 0.5;
 
 // What libraries take, and each thread but the first (lab/177).
-constexpr std::size_t kLibraryBytes = 5'900'000, kThreadBytes = 1'500'000;
+constexpr std::size_t kLibraryBytes = 5'900'000, kThreadBytes = 4'000'000;
 
 // An entry of a piece while it is compressed: in doubles, and as it was (lab/177).
 constexpr std::size_t kPieceEntryBytes = sizeof(double) + sizeof(float);
