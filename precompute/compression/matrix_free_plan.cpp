@@ -26,7 +26,7 @@ constexpr double kCouplingBytes = 1.3;
 
 // Of a patch: the lights, with their norms and what is tried of them (lab/177). Where the sky is
 // open, lamps light fewer patches and fewer exchange light.
-constexpr double kPatchBytes = kFittingLightBytes + 1200, kLessIfOpen = 0.5;
+constexpr double kPatchBytes = kFittingLightBytes + 1200, kLessIfOpen = 0.6;
 
 // What libraries take, and each thread but the first (lab/177).
 constexpr std::size_t kLibraryBytes = 5'900'000, kThreadBytes = 4'000'000;
