@@ -13,16 +13,23 @@
 
 namespace rebounce {
 
+/// The most groups that the patches of a matrix have.
+inline constexpr std::size_t kMostPatchGroups = 64;
+
 /// What compression reads: a matrix M over the patches for each distinct channel, in its symmetric
 /// form A^1/2 M A^-1/2, where A holds the areas. Usable from any number of threads.
 class SymmetricMatrix {
  public:
-  /// `roles`: the rows of receivers and the columns of sources are wanted.
-  explicit SymmetricMatrix(PatchRoles roles = {}) : roles_(std::move(roles)) {}
+  /// `roles`: the rows of receivers and the columns of sources are wanted. `group` [n] or empty:
+  /// patches of different groups, below kMostPatchGroups, have small entries between them.
+  explicit SymmetricMatrix(PatchRoles roles = {}, std::vector<std::uint8_t> group = {})
+      : roles_(std::move(roles)), group_(std::move(group)) {}
   virtual ~SymmetricMatrix() = default;
 
   /// Entries and products are those of the whole matrix, whatever the roles.
   const PatchRoles& roles() const { return roles_; }
+  /// The group of each patch, [n]; empty if all are of one.
+  const std::vector<std::uint8_t>& group() const { return group_; }
 
   /// [n] m².
   virtual std::span<const float> area() const = 0;
@@ -52,6 +59,7 @@ class SymmetricMatrix {
 
  private:
   PatchRoles roles_;
+  std::vector<std::uint8_t> group_;
 };
 
 /// Yhat, from a dense operator in f32.

@@ -1,6 +1,8 @@
 #include "precompute/compression/checkpoint_identity.h"
 
 #include <array>
+#include <cstdint>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -8,6 +10,12 @@
 #include "transfer/format/hierarchical_storage.h"
 
 namespace rebounce {
+namespace {
+
+// The layout of the couplings of a cell in a checkpoint; another number for each.
+constexpr std::uint32_t kCouplingLayout = 1;
+
+}  // namespace
 
 std::string identity_of_couplings(const HierarchicalOperator& form_factors,
                                   const PatchTable& patches,
@@ -15,8 +23,9 @@ std::string identity_of_couplings(const HierarchicalOperator& form_factors,
                                   const PatchRoles& roles, std::span<const double> numbers) {
   Identity identity;
   const HierarchicalStorage& f = form_factors.storage();
-  identity.add(numbers, f.blocks, f.values_f32.span(), f.values_f16.span(), f.bases_q8.span(),
-               f.packed_couplings.span(), f.row_format, f.patch);
+  identity.add(std::span(&kCouplingLayout, 1), numbers, f.blocks, f.values_f32.span(),
+               f.values_f16.span(), f.bases_q8.span(), f.packed_couplings.span(), f.row_format,
+               f.patch);
   identity.add(patches.area, patches.centroid, patches.normal, patches.reflectance, roles.role);
   for (const std::vector<Float3>& light : training) identity.add(light);
   return identity.text();

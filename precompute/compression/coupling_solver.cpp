@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <utility>
@@ -20,11 +21,27 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXf;
 
-// Cells whose vectors are packed together: enough that few packs are not full.
+// Cells of each group whose vectors are packed together: enough that few packs are not full.
 constexpr std::size_t kPackedCells = 8;
+
+std::size_t group_count(const SharedBases& bases) {
+  return bases.group.empty() ? 1 : 1 + std::ranges::max(bases.group);
+}
 
 std::string name_of(std::size_t cell) {
   return fmt::format("cell_{:04}", cell);
+}
+
+/// The cells: first the first of each group, then the second of each, and so on.
+std::vector<std::size_t> order_by_groups(const SharedBases& bases) {
+  std::vector<std::size_t> order(bases.cell_count()), place(bases.cell_count(), 0);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  if (bases.group.empty()) return order;
+  std::vector<std::size_t> count(group_count(bases), 0);
+  for (const std::size_t cell : order) place[cell] = count[bases.group[cell]]++;
+  std::ranges::stable_sort(
+      order, {}, [&](std::size_t cell) { return std::pair(place[cell], bases.group[cell]); });
+  return order;
 }
 
 /// Of each cell, whether any entry on or below the diagonal is wanted in its columns.
@@ -57,7 +74,9 @@ CouplingSolver::CouplingSolver(const SolvedTransfer& solved, const SharedBases& 
     : solved_(solved),
       bases_(bases),
       is_wanted_(wanted_columns(cells)),
-      together_(piece_count(Ranks().least(cells_together), kPackedCells) * kPackedCells),
+      order_(order_by_groups(bases)),
+      packed_together_(kPackedCells * group_count(bases)),
+      together_(piece_count(Ranks().least(cells_together), kPackedCells) * packed_together_),
       checkpoint_(checkpoint),
       couplings_(bases.cell_count()),
       packed_(bases.cell_count()) {
@@ -81,35 +100,68 @@ bool CouplingSolver::is_missing(const Pack& pack) const {
   return std::ranges::any_of(pack.parts, [&](const Part& part) { return is_missing(part.cell); });
 }
 
-/// All vectors of one matrix of the wanted cells [begin, end).
-std::vector<CouplingSolver::Pack> CouplingSolver::packs_between(std::size_t begin, std::size_t end,
-                                                                std::uint32_t matrix) const {
-  std::vector<Pack> packs;
-  for (std::size_t cell = begin; cell < end; ++cell) {
-    if (!is_wanted_[cell]) continue;
-    const Index rank = bases_.rank(matrix, cell);
-    for (Index first = 0; first < rank;) {
-      if (packs.empty() || packs.back().width == SolvedTransfer::kBatchColumns) {
-        packs.push_back({matrix, {}});
-      }
-      Pack& pack = packs.back();
-      const Index count = std::min(rank - first, SolvedTransfer::kBatchColumns - pack.width);
-      pack.parts.push_back({cell, first, count});
-      pack.width += count;
-      first += count;
+class CouplingSolver::Packs {
+ public:
+  explicit Packs(std::uint32_t matrix) : matrix_(matrix) {}
+
+  /// Adds vectors of a cell from a column on, counted from begin_next(). Returns that behind them.
+  Index add(Index column, std::size_t cell, Index begin, Index end) {
+    while (begin < end) {
+      const std::size_t pack = first_ + static_cast<std::size_t>(column / kColumns);
+      const Index in_pack = column % kColumns, count = std::min(end - begin, kColumns - in_pack);
+      if (pack >= packs_.size()) packs_.resize(pack + 1, {matrix_, {}});
+      packs_[pack].parts.push_back({cell, begin, count, in_pack});
+      packs_[pack].width = std::max(packs_[pack].width, in_pack + count);
+      begin += count;
+      column += count;
     }
+    return column;
   }
-  return packs;
+
+  /// What follows is in other packs.
+  void begin_next() { first_ = packs_.size(); }
+
+  std::vector<Pack> take() { return std::move(packs_); }
+
+ private:
+  static constexpr Index kColumns = SolvedTransfer::kBatchColumns;
+  std::uint32_t matrix_;
+  std::size_t first_ = 0;
+  std::vector<Pack> packs_;
+};
+
+std::span<const std::size_t> CouplingSolver::cells_of_run(std::size_t first,
+                                                          std::size_t count) const {
+  return std::span(order_).subspan(first, std::min(count, order_.size() - first));
 }
 
-/// The packs of the run that begins with cell `first` that hold a missing cell.
-std::vector<CouplingSolver::Pack> CouplingSolver::packs_of(std::size_t first) const {
+/// All vectors of one matrix of those of `cells` that are wanted.
+std::vector<CouplingSolver::Pack> CouplingSolver::packs_of(std::span<const std::size_t> cells,
+                                                           std::uint32_t matrix) const {
+  Packs packs(matrix);
+  Index far = 0;
+  for (const std::size_t cell : cells) {
+    if (is_wanted_[cell]) far = packs.add(far, cell, 0, bases_.bases[matrix][cell].far_rank);
+  }
+  packs.begin_next();
+  std::vector<Index> near(group_count(bases_), 0);  // the next column of each group
+  for (const std::size_t cell : cells) {
+    if (!is_wanted_[cell]) continue;
+    Index& column = near[bases_.group.empty() ? 0 : bases_.group[cell]];
+    column =
+        packs.add(column, cell, bases_.bases[matrix][cell].far_rank, bases_.rank(matrix, cell));
+  }
+  return packs.take();
+}
+
+/// The packs of the run that begins with `first`: `all`, or those that hold a missing cell.
+std::vector<CouplingSolver::Pack> CouplingSolver::packs_of(std::size_t first, bool all) const {
   std::vector<Pack> packs;
-  const std::size_t last = std::min(bases_.cell_count(), first + together_);
-  for (std::size_t begin = first; begin < last; begin += kPackedCells) {
+  const std::size_t last = std::min(order_.size(), first + together_);
+  for (std::size_t begin = first; begin < last; begin += packed_together_) {
     for (std::uint32_t m = 0; m < solved_.matrix_count(); ++m) {
-      for (Pack& pack : packs_between(begin, std::min(last, begin + kPackedCells), m)) {
-        if (is_missing(pack)) packs.push_back(std::move(pack));
+      for (Pack& pack : packs_of(cells_of_run(begin, packed_together_), m)) {
+        if (all || is_missing(pack)) packs.push_back(std::move(pack));
       }
     }
   }
@@ -122,11 +174,10 @@ double CouplingSolver::work_of(std::size_t first) const {
   return work;
 }
 
-std::size_t CouplingSolver::vector_count() const {
+std::size_t CouplingSolver::solve_count() const {
   Index count = 0;
-  for (std::size_t cell = 0; cell < bases_.cell_count(); ++cell) {
-    if (!is_wanted_[cell]) continue;
-    for (std::uint32_t m = 0; m < solved_.matrix_count(); ++m) count += bases_.rank(m, cell);
+  for (std::size_t first = 0; first < order_.size(); first += together_) {
+    for (const Pack& pack : packs_of(first, true)) count += pack.width;
   }
   return static_cast<std::size_t>(count);
 }
@@ -153,14 +204,23 @@ std::vector<PackedCouplings> CouplingSolver::run(const Progress& progress) {
     solve_run(first, part_of(progress, done / all, (done + more) / all));
     done += more;
   }
-  ranks.share(std::span(packed_), together_);
+  share_packed();
   return std::move(packed_);
+}
+
+void CouplingSolver::share_packed() {
+  const Ranks ranks;
+  if (ranks.alone()) return;
+  std::vector<PackedCouplings> ordered(order_.size());
+  for (std::size_t k = 0; k < order_.size(); ++k) ordered[k] = std::move(packed_[order_[k]]);
+  ranks.share(std::span(ordered), together_);
+  for (std::size_t k = 0; k < order_.size(); ++k) packed_[order_[k]] = std::move(ordered[k]);
 }
 
 void CouplingSolver::solve_run(std::size_t first, const Progress& progress) {
   const std::vector<Pack> packs = packs_of(first);
   std::vector<std::size_t> missing;
-  for (std::size_t cell = first; cell < std::min(bases_.cell_count(), first + together_); ++cell) {
+  for (const std::size_t cell : cells_of_run(first, together_)) {
     if (is_missing(cell)) missing.push_back(cell);
   }
   for (const std::size_t cell : missing) couplings_[cell].resize(bases_.coupling_count(cell));
@@ -185,38 +245,41 @@ void CouplingSolver::solve(const Pack& pack, SolvedTransfer::Workspace& workspac
   const std::uint32_t matrix = pack.matrix;
   SolvedTransfer::Vectors sent =
       SolvedTransfer::Vectors::Zero(solved_.position_count(), pack.width);
-  Index column = 0;
-  for (const auto& [cell, begin, count] : pack.parts) {
+  std::size_t lowest = bases_.cell_count();
+  std::vector<std::size_t> offset;  // of the next block of each part, in the couplings of its cell
+  for (const auto& [cell, begin, count, column] : pack.parts) {
     const MatrixXf& lights = bases_.bases[matrix][cell].lights;
     for (std::size_t k = 0; k < position_[cell].size(); ++k) {
       sent.row(position_[cell][k]).segment(column, count) =
           lights.row(static_cast<Index>(k)).segment(begin, count);
     }
-    column += count;
+    lowest = std::min(lowest, cell);
+    offset.push_back(bases_.coupling_begin(matrix, cell));
   }
   const SolvedTransfer::Vectors& arrived = solved_.later_bounces(matrix, sent, workspace);
-  for (std::size_t d = pack.parts.front().cell; d < bases_.cell_count(); ++d) {
+  for (std::size_t d = lowest; d < bases_.cell_count(); ++d) {
     MatrixXf light(position_[d].size(), pack.width);
     for (std::size_t k = 0; k < position_[d].size(); ++k) {
       light.row(static_cast<Index>(k)) = arrived.row(position_[d][k]);
     }
-    keep(pack, d, bases_.bases[matrix][d].lights.transpose() * light);
+    const MatrixXf found = bases_.bases[matrix][d].lights.transpose() * light;
+    for (std::size_t p = 0; p < pack.parts.size(); ++p) {
+      if (pack.parts[p].cell > d) continue;
+      keep(pack.matrix, pack.parts[p], d, found, offset[p]);
+      offset[p] += bases_.coupling_size(matrix, d, pack.parts[p].cell);
+    }
   }
 }
 
-/// Keeps the couplings of the vectors of a pack with those of cell `d`, where they are missing.
-void CouplingSolver::keep(const Pack& pack, std::size_t d, const MatrixXf& found) {
-  Index column = 0;
-  for (const auto& [cell, begin, count] : pack.parts) {
-    if (cell <= d && is_missing(cell)) {
-      const Index rows = bases_.ranks_between(pack.matrix, cell, bases_.cell_count());
-      float* const first = couplings_[cell].data() + bases_.coupling_begin(pack.matrix, cell);
-      Eigen::Map<MatrixXf> couplings(first + begin * rows, rows, count);
-      couplings.middleRows(bases_.ranks_between(pack.matrix, cell, d), found.rows()) =
-          found.middleCols(column, count);
-    }
-    column += count;
-  }
+/// Keeps the couplings of the vectors of a part with those of cell `d`, whose couplings with the
+/// cell of the part begin at `offset`, where they are missing.
+void CouplingSolver::keep(std::uint32_t matrix, const Part& part, std::size_t d,
+                          const MatrixXf& found, std::size_t offset) {
+  const Index rows = bases_.coupled_rank(matrix, d, part.cell),
+              columns = bases_.coupled_rank(matrix, part.cell, d);
+  if (part.begin >= columns || couplings_[part.cell].empty()) return;
+  Eigen::Map<MatrixXf> coupling(couplings_[part.cell].data() + offset, rows, columns);
+  coupling.middleCols(part.begin, part.count) = found.block(0, part.column, rows, part.count);
 }
 
 }  // namespace rebounce

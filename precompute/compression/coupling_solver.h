@@ -25,18 +25,21 @@ struct FramedCells {
 std::uint64_t coupling_count(const SharedBases& bases, const FramedCells& cells);
 
 /// Solves for the couplings of shared bases, some cells at a time.
+///
+/// Vectors that light goes to other groups with are solved for one by one. What the others of a
+/// group send hardly leaves it, so that one vector of each group shares a solve.
 class CouplingSolver {
  public:
   /// Finds the cells that `checkpoint` holds. `solved`, `bases` and `checkpoint` must outlive the
-  /// object. `cells_together` > 0 cells or a few more are solved for at the same time; the bits do
-  /// not depend on it. Ranks take runs of so many cells in turns.
+  /// object. `cells_together` > 0 cells of each group, or a few more, are solved for at the same
+  /// time; the bits do not depend on it. Ranks take runs of so many cells in turns.
   CouplingSolver(const SolvedTransfer& solved, const SharedBases& bases, const FramedCells& cells,
                  std::size_t cells_together, const BlockCheckpoint& checkpoint);
 
-  /// The vectors of all wanted cells, whoever solves for them.
-  std::size_t vector_count() const;
+  /// The solves for all wanted cells, whoever makes them.
+  std::size_t solve_count() const;
 
-  /// The vectors that this rank has to solve for.
+  /// The solves that this rank has to make.
   double work() const;
 
   /// Does the work and keeps the couplings of every cell in the checkpoint. Returns those of all
@@ -44,33 +47,41 @@ class CouplingSolver {
   std::vector<PackedCouplings> run(const Progress& progress);
 
  private:
-  /// Neighbouring vectors of the basis of a cell.
+  /// Neighbouring vectors of the basis of a cell, and the first of their columns in a pack.
   struct Part {
     std::size_t cell;
-    Eigen::Index begin, count;
+    Eigen::Index begin, count, column;
   };
 
-  /// Vectors that one thread solves for. Which ones follows from the ranks of the bases alone, as
-  /// the bits of a product depend on its width.
+  /// What one thread solves for. Which vectors follows from the bases alone, as the bits of a
+  /// product depend on its width.
   struct Pack {
     std::uint32_t matrix;
-    std::vector<Part> parts;  ///< ascending
+    std::vector<Part> parts;
     Eigen::Index width = 0;
   };
 
+  /// Packs that are filled column by column.
+  class Packs;
+
   bool is_missing(std::size_t cell) const;
   bool is_missing(const Pack& pack) const;
-  double work_of(std::size_t first) const;  ///< of the run that begins with this cell
-  std::vector<Pack> packs_of(std::size_t first) const;
-  std::vector<Pack> packs_between(std::size_t begin, std::size_t end, std::uint32_t matrix) const;
+  std::span<const std::size_t> cells_of_run(std::size_t first, std::size_t count) const;
+  double work_of(std::size_t first) const;  ///< of the run that begins with this one
+  std::vector<Pack> packs_of(std::size_t first, bool all = false) const;
+  std::vector<Pack> packs_of(std::span<const std::size_t> cells, std::uint32_t matrix) const;
   void solve_run(std::size_t first, const Progress& progress);
   void solve(const Pack& pack, SolvedTransfer::Workspace& workspace);
-  void keep(const Pack& pack, std::size_t d, const Eigen::MatrixXf& found);
+  void keep(std::uint32_t matrix, const Part& part, std::size_t d, const Eigen::MatrixXf& found,
+            std::size_t offset);
+  void share_packed();
 
   const SolvedTransfer& solved_;
   const SharedBases& bases_;
   std::vector<bool> is_wanted_;
-  std::size_t together_;
+  std::vector<std::size_t> order_;  ///< of the cells: the first of each group, then the second
+  std::size_t packed_together_;     ///< cells whose vectors are packed together
+  std::size_t together_;            ///< cells of a run
   const BlockCheckpoint& checkpoint_;
   std::vector<std::vector<std::uint32_t>> position_;  ///< of the patches of each cell
   std::vector<std::vector<float>> couplings_;         ///< by cell, of the run that is solved for

@@ -51,7 +51,9 @@ CompressionFrame frame_of(const SymmetricMatrix& matrix, const PatchTable& patch
   CompressionFrame frame;
   frame.roles = matrix.roles();
   frame.received_part = training.received().part();
-  frame.tree = build_cluster_tree(patches, kLeafSize, kAlignment, role_groups(frame.roles));
+  frame.group = matrix.group();
+  frame.tree =
+      build_cluster_tree(patches, kLeafSize, kAlignment, tree_groups(frame.roles, frame.group));
   frame.background = background_light(matrix, frame.tree);
   frame.sample = training.normalised_lights(frame.tree.patch,
                                             HierarchicalFormat::position_count(patches.size()));

@@ -24,7 +24,9 @@ struct CompressionFrame {
   Eigen::VectorXd background;  ///< from background_light
   Eigen::MatrixXd sample;      ///< the training lights, normalised
   PatchRoles roles;            ///< of the matrix
-  double received_part = 1;    ///< ErrorReference::part of the training lights
+  /// The group of each patch, [n]; empty if all are of one (SymmetricMatrix::group).
+  std::vector<std::uint8_t> group;
+  double received_part = 1;  ///< ErrorReference::part of the training lights
 
   /// Scales a multiplier, `usual` with all patches as receivers, to these roles: squared errors are
   /// relative to the light that arrives at receivers.

@@ -118,7 +118,7 @@ MatrixFreeTransfer::MatrixFreeTransfer(const HierarchicalOperator& form_factors,
   CouplingSolver solver(state.solved, bases, framed, state.plan.cell_count, checkpoint);
   const double begin = kBefore / usual, all = kBefore + solver.work() + kVectorsOfRounds;
   state.solving_part = std::max(begin, (kBefore + solver.work()) / all);
-  state.solve_count = bases.sample_count + solver.vector_count();
+  state.solve_count = bases.sample_count + solver.solve_count();
   std::vector<PackedCouplings> couplings = solver.run(part_of(progress, begin, state.solving_part));
   state.matrix.set_entries(std::move(bases), std::move(couplings));
 }

@@ -1,15 +1,18 @@
 #include "precompute/compression/sampled_bases.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <numeric>
 #include <span>
+#include <utility>
 
 #include "precompute/base/blas.h"
 #include "precompute/base/parallel_loop.h"
 #include "precompute/base/random_signs.h"
 #include "precompute/base/ranks.h"
+#include "precompute/compression/light_directions.h"
 #include "precompute/compression/light_weights.h"
 
 namespace rebounce {
@@ -29,63 +32,18 @@ constexpr Index kSamples = 128, kGroupSamples = 32;
 // et al., theorem 10.5). Energies fall so steeply that this is worth a few vectors in a hundred.
 constexpr double kSamplesOfRank = 3;
 
-// The fewest and the most samples for each matrix, with those that judge (lab/132).
-constexpr Index kLeastSamples = 512, kMostSamples = 1536;
+// The fewest and the most samples for each matrix, with those that judge (lab/132). Of far
+// directions there are fewer.
+constexpr Index kLeastSamples = 512, kLeastFarSamples = 256, kMostSamples = 1536;
+
+// The part of the allowed error that is left to light between groups of cells (lab/178).
+constexpr double kFarPart = 0.25;
 
 // The energy that rounding of couplings adds, as a part of what bases miss (lab/156).
 constexpr double kRoundedPart = 1.0 / 16;
 
 /// Light of all bounces but the first over each cell under its weight, [patches][samples].
 using Samples = std::vector<MatrixXf>;
-
-/// Orthonormal directions of the weighted light over a cell, those with the most energy first.
-struct Directions {
-  MatrixXd vectors;  ///< one to a column, [patches][patches]
-  VectorXd missing;  ///< [k] energy of the whole, without the first k; [directions + 1]
-
-  /// The rank at which the missing energy and `worth` for each vector are together the least.
-  Index rank(double worth) const {
-    Index best = 0;
-    for (Index k = 1; k < missing.size(); ++k) {
-      if (missing[k] + worth * static_cast<double>(k) <
-          missing[best] + worth * static_cast<double>(best)) {
-        best = k;
-      }
-    }
-    return best;
-  }
-};
-
-std::vector<Index> ranks_at(std::span<const Directions> cells, double worth) {
-  std::vector<Index> ranks;
-  for (const Directions& cell : cells) ranks.push_back(cell.rank(worth));
-  return ranks;
-}
-
-/// The smallest ranks with which at most the `allowed` energy is missing, or as little as can be.
-std::vector<Index> ranks_within(std::span<const Directions> cells, double allowed) {
-  constexpr int kHalvings = 60;
-  double most = 0;
-  for (const Directions& cell : cells) most = std::max(most, cell.missing[0]);
-  std::vector<Index> ranks = ranks_at(cells, 0);
-  double low = 0, high = most;
-  for (int step = 0; step < kHalvings; ++step) {
-    // The worth of a vector spans many orders of magnitude.
-    const double middle = low > 0 ? std::sqrt(low * high) : high * 1e-12;
-    const std::vector<Index> tried = ranks_at(cells, middle);
-    double missing = 0;
-    for (std::size_t c = 0; c < cells.size(); ++c) missing += cells[c].missing[tried[c]];
-    if (missing <= allowed) {
-      ranks = tried;
-      low = middle;
-    } else if (low == 0) {
-      break;
-    } else {
-      high = middle;
-    }
-  }
-  return ranks;
-}
 
 Index sum_of(std::span<const Index> ranks) {
   return std::accumulate(ranks.begin(), ranks.end(), Index{0});
@@ -99,6 +57,31 @@ double error_of_energy(const CompressionFrame& frame) {
   const auto sources = static_cast<double>(
       frame.roles.count(PatchRoles::kSource, static_cast<std::size_t>(frame.sample.rows())));
   return sample / sources / static_cast<double>(frame.sample.cols());
+}
+
+/// The directions of the light over the cells, and how many of them a basis takes.
+struct ChosenDirections {
+  std::vector<LightDirections> cells;
+  std::vector<Index> ranks;
+  double squared_error = 0;  ///< of light with these ranks
+};
+
+/// The directions of samples `from` of each cell, after those that are `kept`.
+std::vector<LightDirections> find_directions(const Samples& from, const Samples& judges,
+                                             std::span<const MatrixXd> kept) {
+  std::vector<LightDirections> cells(from.size());
+  parallel_loop(cells.size(), [&](std::size_t c) {
+    cells[c] = find_light_directions(from[c], judges[c], kept[c]);
+  });
+  return cells;
+}
+
+/// The group of most of `patches`.
+std::uint32_t usual_group(const CompressionFrame& frame, std::span<const std::uint32_t> patches) {
+  if (frame.group.empty()) return 0;
+  std::array<std::size_t, kMostPatchGroups> count{};
+  for (const std::uint32_t p : patches) ++count[frame.group[p]];
+  return static_cast<std::uint32_t>(std::ranges::max_element(count) - count.begin());
 }
 
 /// Draws samples of one matrix over cells.
@@ -120,17 +103,23 @@ class BasisSampler {
       if (sends) cell.weight = &weights_[c];
       for (const std::uint32_t p : cell.patches) cell.position.push_back(position[p]);
     }
+    for (const Cell& cell : cells_) group_.push_back(usual_group(frame, cell.patches));
   }
 
-  /// Samples that are those of no other number.
-  Samples draw(std::uint32_t matrix, std::uint64_t number) const {
+  /// The group of each cell.
+  const std::vector<std::uint32_t>& group() const { return group_; }
+
+  /// Samples that are those of no other number. Sources of a cell send those samples k, counted
+  /// over all numbers, for which `is_lit`(cell, k).
+  template <typename IsLit>
+  Samples draw(std::uint32_t matrix, std::uint64_t number, const IsLit& is_lit) const {
     const Ranks ranks;
     const auto rows = static_cast<Index>(frame_.tree.patch.size());
     MatrixXf light(rows, kSamples);
     parallel_loop(kSamples / kGroupSamples, [&](std::size_t group) {
       if (!ranks.makes(group)) return;
       const Index begin = static_cast<Index>(group) * kGroupSamples;
-      draw_group(matrix, number * kSamples + begin, light.middleCols(begin, kGroupSamples));
+      draw_group(matrix, number * kSamples + begin, is_lit, light.middleCols(begin, kGroupSamples));
     });
     ranks.share(std::span(light.data(), static_cast<std::size_t>(light.size())),
                 static_cast<std::size_t>(kGroupSamples * rows));
@@ -141,28 +130,9 @@ class BasisSampler {
     return samples;
   }
 
-  /// The directions of samples `from`, with the energies of other samples.
-  std::vector<Directions> find_directions(const Samples& from, const Samples& judges) const {
-    std::vector<Directions> cells(from.size());
-    parallel_loop(cells.size(), [&](std::size_t c) {
-      const MatrixXd light = from[c].cast<double>();
-      MatrixXd gram = MatrixXd::Zero(light.rows(), light.rows());
-      gram.selfadjointView<Eigen::Lower>().rankUpdate(light);
-      const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(gram);
-      cells[c].vectors = solver.eigenvectors().rowwise().reverse();
-      const VectorXd energies =
-          (cells[c].vectors.transpose() * judges[c].cast<double>()).rowwise().squaredNorm() /
-          static_cast<double>(judges[c].cols());
-      VectorXd& missing = cells[c].missing;
-      missing.setZero(energies.size() + 1);
-      for (Index k = energies.size(); k-- > 0;) missing[k] = missing[k + 1] + energies[k];
-    });
-    return cells;
-  }
-
   /// The mean square of the relative error of arriving light, of what `judges` stand for, with
   /// these ranks.
-  double squared_error(std::span<const Directions> cells, std::span<const Index> ranks,
+  double squared_error(std::span<const LightDirections> cells, std::span<const Index> ranks,
                        const Samples& judges) const {
     std::vector<double> missing(cells.size());
     parallel_loop(cells.size(), [&](std::size_t c) {
@@ -176,8 +146,9 @@ class BasisSampler {
     return error_of_energy_ * std::accumulate(missing.begin(), missing.end(), 0.0);
   }
 
-  /// The basis of a cell from the first directions of its weighted light.
-  SharedBases::Basis basis(std::size_t c, const Directions& directions, Index rank) const {
+  /// The basis of a cell from the first directions of its weighted light. Those that are kept are
+  /// far ones.
+  SharedBases::Basis basis(std::size_t c, const LightDirections& directions, Index rank) const {
     const Cell& cell = cells_[c];
     MatrixXd lights = MatrixXd::Zero(cell.cluster.count, rank);
     lights.topRows(cell.patch_count()) = directions.vectors.leftCols(rank);
@@ -187,7 +158,7 @@ class BasisSampler {
       cell.weight->unweigh_rows(vectors);
     }
     return {lights.topRows(cell.patch_count()).cast<float>(),
-            vectors.topRows(cell.patch_count()).cast<float>()};
+            vectors.topRows(cell.patch_count()).cast<float>(), directions.kept};
   }
 
   std::vector<std::vector<std::uint32_t>> patches() const {
@@ -229,11 +200,18 @@ class BasisSampler {
     return part.topRows(cell.patch_count());
   }
 
-  void draw_group(std::uint32_t matrix, std::uint64_t seed, Eigen::Ref<MatrixXf> light) const {
+  /// The samples from number `first` on.
+  template <typename IsLit>
+  void draw_group(std::uint32_t matrix, std::uint64_t first, const IsLit& is_lit,
+                  Eigen::Ref<MatrixXf> light) const {
     SolvedTransfer::Workspace workspace;
     Vectors sent = Vectors::Zero(solved_.position_count(), kGroupSamples);
-    for (const Cell& cell : cells_) {
-      const MatrixXd random = random_light(cell, seed << 32);
+    for (std::size_t c = 0; c < cells_.size(); ++c) {
+      const Cell& cell = cells_[c];
+      MatrixXd random = random_light(cell, first << 32);
+      for (Index k = 0; k < kGroupSamples; ++k) {
+        if (!is_lit(c, first + static_cast<std::uint64_t>(k))) random.col(k).setZero();
+      }
       for (Index k = 0; k < cell.patch_count(); ++k) {
         sent.row(cell.position[k]) = random.row(k).cast<float>();
       }
@@ -250,55 +228,61 @@ class BasisSampler {
   double error_of_energy_;
   std::vector<ClusterWeight> weights_;  ///< of the cells
   std::vector<Cell> cells_;
+  std::vector<std::uint32_t> group_;  ///< of each cell
 };
+
+void append(MatrixXf& light, const MatrixXf& more) {
+  const Index before = light.cols();
+  light.conservativeResize(more.rows(), before + more.cols());
+  light.rightCols(more.cols()) = more;
+}
 
 void append(Samples& light, const Samples& more) {
   if (light.empty()) light.resize(more.size());
-  for (std::size_t c = 0; c < light.size(); ++c) {
-    const Index before = light[c].cols();
-    light[c].conservativeResize(more[c].rows(), before + more[c].cols());
-    light[c].rightCols(more[c].cols()) = more[c];
-  }
+  for (std::size_t c = 0; c < light.size(); ++c) append(light[c], more[c]);
 }
 
-/// The smallest ranks with a mean square error of about `allowed`, as judges tell it.
-std::vector<Index> find_ranks(const BasisSampler& sampler, std::span<const Directions> cells,
-                              const Samples& judges, double allowed) {
+/// The smallest ranks with a mean square error of about `allowed`, as judges tell it, and what they
+/// err by.
+void choose_ranks(const BasisSampler& sampler, const Samples& judges, double allowed,
+                  ChosenDirections& chosen) {
   // The weights of the cells are known, and what their missing energy means for light follows from
   // it nearly in proportion.
-  constexpr int kSteps = 4;
+  constexpr int kSteps = 4, kMostSteps = 12;
+  constexpr double kMostOver = 1.2;
+  const auto is_over = [&] { return chosen.squared_error > kMostOver * allowed; };
   double energy = 0;
-  for (const Directions& cell : cells) energy += cell.missing[0];
-  std::vector<Index> ranks(cells.size());
-  double error = sampler.squared_error(cells, ranks, judges);
-  for (int step = 0; step < kSteps && error > 0; ++step) {
-    energy *= allowed / error;
-    ranks = ranks_within(cells, energy);
-    error = sampler.squared_error(cells, ranks, judges);
+  std::vector<Index> kept;
+  for (const LightDirections& cell : chosen.cells) {
+    energy += cell.missing[cell.kept];
+    kept.push_back(cell.kept);
   }
-  return ranks;
-}
-
-/// The step of couplings that rounding adds a part of the missing energy with. Bases are
-/// orthonormal under their weights, so that the errors of the couplings have the energy of those of
-/// the light; an error of rounding has a twelfth of the square of the step.
-double step_of(std::span<const Directions> cells, std::span<const Index> ranks) {
-  double missing = 0;
-  for (std::size_t c = 0; c < cells.size(); ++c) missing += cells[c].missing[ranks[c]];
-  const auto vectors = static_cast<double>(std::max<Index>(1, sum_of(ranks)));
-  return std::sqrt(12 * kRoundedPart * missing) / vectors;
-}
-
-/// Appends the bases of one matrix.
-void sample_matrix(const BasisSampler& sampler, std::uint32_t matrix, double allowed,
-                   SharedBases& result, const Progress& progress) {
-  std::uint64_t number = 0;
-  const auto draw = [&] {
-    report_progress(progress, std::min(1.0, static_cast<double>(number * kSamples) / kMostSamples));
-    return sampler.draw(matrix, number++);
+  const auto take = [&](std::vector<Index> ranks) {
+    chosen.squared_error = sampler.squared_error(chosen.cells, ranks, judges);
+    chosen.ranks = std::move(ranks);
   };
+  take(std::move(kept));
+  std::vector<Index> within;
+  for (int step = 0; step < (is_over() ? kMostSteps : kSteps); ++step) {
+    if (chosen.squared_error == 0) break;
+    energy *= allowed / chosen.squared_error;
+    take(ranks_within(chosen.cells, energy));
+    if (chosen.squared_error <= allowed) within = chosen.ranks;
+  }
+  // Where a few directions have nearly all the energy, the error jumps.
+  if (is_over()) {
+    take(within.empty() ? ranks_within(chosen.cells, 0) : std::move(within));
+  }
+}
+
+/// Finds directions of samples that `draw`() gives, with which light errs by `allowed`, after those
+/// that are `kept`. More are drawn until they are several times the usual rank.
+template <typename Draw>
+ChosenDirections choose_directions(const BasisSampler& sampler, std::span<const MatrixXd> kept,
+                                   double allowed, Index least_samples, const Draw& draw) {
+  ChosenDirections chosen;
   Samples light;
-  double enough = kLeastSamples - kSamples;
+  auto enough = static_cast<double>(least_samples - kSamples);
   const auto are_enough = [&] {
     const Index count = light.empty() ? 0 : light.front().cols();
     return static_cast<double>(count) >= enough || count >= kMostSamples;
@@ -306,22 +290,142 @@ void sample_matrix(const BasisSampler& sampler, std::uint32_t matrix, double all
   for (;;) {
     while (!are_enough()) append(light, draw());
     const Samples judges = draw();
-    const std::vector<Directions> directions = sampler.find_directions(light, judges);
-    const std::vector<Index> ranks = find_ranks(sampler, directions, judges, allowed);
-    enough =
-        kSamplesOfRank * static_cast<double>(sum_of(ranks)) / static_cast<double>(ranks.size());
-    if (!are_enough()) {
-      append(light, judges);
-      continue;
-    }
-    result.step.push_back(step_of(directions, ranks));
-    std::vector<SharedBases::Basis>& bases = result.bases.emplace_back();
-    for (std::size_t c = 0; c < ranks.size(); ++c) {
-      bases.push_back(sampler.basis(c, directions[c], ranks[c]));
-    }
-    result.sample_count += number * static_cast<std::size_t>(kSamples);
-    return;
+    chosen.cells = find_directions(light, judges, kept);
+    choose_ranks(sampler, judges, allowed, chosen);
+    enough = kSamplesOfRank * static_cast<double>(sum_of(chosen.ranks)) /
+             static_cast<double>(chosen.ranks.size());
+    if (are_enough()) return chosen;
+    append(light, judges);
   }
+}
+
+/// The number of couplings of all cells with each other.
+double couplings_of(std::span<const std::uint32_t> group, std::span<const LightDirections> cells,
+                    std::span<const Index> ranks) {
+  std::vector<double> all(group.size(), 0), far(group.size(), 0);  // of each group
+  for (std::size_t c = 0; c < group.size(); ++c) {
+    all[group[c]] += static_cast<double>(ranks[c]);
+    far[group[c]] += static_cast<double>(cells[c].kept);
+  }
+  const double every_far = std::accumulate(far.begin(), far.end(), 0.0);
+  double count = every_far * every_far;
+  for (std::size_t g = 0; g < group.size(); ++g) count += all[g] * all[g] - far[g] * far[g];
+  return count;
+}
+
+/// The step of couplings that rounding adds a part of the missing energy with. Bases are
+/// orthonormal under their weights, so that the errors of the couplings have the energy of those of
+/// the light; an error of rounding has a twelfth of the square of the step.
+double step_of(std::span<const std::uint32_t> group, const ChosenDirections& chosen) {
+  double missing = 0;
+  for (std::size_t c = 0; c < group.size(); ++c) {
+    missing += chosen.cells[c].missing[chosen.ranks[c]];
+  }
+  const double couplings = couplings_of(group, chosen.cells, chosen.ranks);
+  return std::sqrt(12 * kRoundedPart * missing) / std::sqrt(std::max(1.0, couplings));
+}
+
+/// Samples of one matrix of the light that comes to cells from other groups. Two samples follow
+/// each other that have sources in half of the groups and in the other half; a cell takes the one
+/// whose sources are in other groups than its own.
+///
+/// Which groups are lit is a row of a Hadamard matrix: the parity of the binary digits that the
+/// numbers of the row and of the group share. Over all rows but that without digits, any two groups
+/// are in different halves equally often.
+class FarSampler {
+ public:
+  FarSampler(const BasisSampler& sampler, std::uint32_t matrix)
+      : sampler_(sampler),
+        matrix_(matrix),
+        rows_(std::bit_ceil(std::ranges::max(sampler.group()) + 1) - 1) {}
+
+  /// The part of the samples in which a group is lit for another one; 0 if there is one group.
+  double lit_part() const { return rows_ == 0 ? 0 : (rows_ + 1) / (2.0 * rows_); }
+  std::size_t sample_count() const { return (number_ - kFirst) * kSamples; }
+
+  /// kSamples more for each cell.
+  Samples draw() {
+    Samples light;
+    for (int half = 0; half < 2; ++half) append(light, draw_half());
+    return light;
+  }
+
+ private:
+  static constexpr std::uint64_t kFirst = 1 << 16;  // behind the numbers of other samples
+
+  bool is_lit(std::size_t cell, std::uint64_t sample) const {
+    const std::uint64_t row = 1 + sample / 2 % rows_;
+    return std::popcount(row & sampler_.group()[cell]) % 2 == static_cast<int>(sample % 2);
+  }
+
+  Samples draw_half() {
+    const Samples all = sampler_.draw(matrix_, number_,
+                                      [&](std::size_t c, std::uint64_t k) { return is_lit(c, k); });
+    Samples light;
+    for (std::size_t c = 0; c < all.size(); ++c) {
+      MatrixXf& from_others = light.emplace_back(all[c].rows(), kSamples / 2);
+      for (Index pair = 0; pair < from_others.cols(); ++pair) {
+        const auto first = static_cast<std::uint64_t>(2 * pair) + number_ * kSamples;
+        from_others.col(pair) = all[c].col(2 * pair + (is_lit(c, first) ? 1 : 0));
+      }
+    }
+    ++number_;
+    return light;
+  }
+
+  const BasisSampler& sampler_;
+  std::uint32_t matrix_, rows_;
+  std::uint64_t number_ = kFirst;
+};
+
+/// The directions in which light goes to and from other groups, [cells].
+struct FarDirections {
+  std::vector<MatrixXd> vectors;
+  double squared_error = 0;  ///< of light without what they leave
+  std::size_t sample_count = 0;
+};
+
+FarDirections find_far(const BasisSampler& sampler, std::uint32_t matrix, double allowed,
+                       const Progress& progress) {
+  std::vector<MatrixXd> none;
+  for (const auto& patches : sampler.patches()) {
+    none.emplace_back(static_cast<Index>(patches.size()), 0);
+  }
+  FarSampler far(sampler, matrix);
+  if (far.lit_part() == 0) return {std::move(none)};
+  double drawn = 0;
+  const auto draw = [&] {
+    report_progress(progress, std::min(1.0, drawn++ * kSamples / kMostSamples));
+    return far.draw();
+  };
+  const ChosenDirections chosen =
+      choose_directions(sampler, none, allowed * far.lit_part(), kLeastFarSamples, draw);
+  FarDirections found{{}, chosen.squared_error / far.lit_part(), far.sample_count()};
+  for (std::size_t c = 0; c < chosen.cells.size(); ++c) {
+    found.vectors.emplace_back(chosen.cells[c].vectors.leftCols(chosen.ranks[c]));
+  }
+  return found;
+}
+
+/// Appends the bases of one matrix.
+void sample_matrix(const BasisSampler& sampler, std::uint32_t matrix, double allowed,
+                   SharedBases& result, const Progress& progress) {
+  const FarDirections far =
+      find_far(sampler, matrix, kFarPart * allowed, part_of(progress, 0, 0.5));
+  const Progress rest = part_of(progress, far.sample_count > 0 ? 0.5 : 0, 1);
+  std::uint64_t number = 0;
+  const auto draw = [&] {
+    report_progress(rest, std::min(1.0, static_cast<double>(number * kSamples) / kMostSamples));
+    return sampler.draw(matrix, number++, [](std::size_t, std::uint64_t) { return true; });
+  };
+  const ChosenDirections chosen =
+      choose_directions(sampler, far.vectors, allowed - far.squared_error, kLeastSamples, draw);
+  result.step.push_back(step_of(sampler.group(), chosen));
+  std::vector<SharedBases::Basis>& bases = result.bases.emplace_back();
+  for (std::size_t c = 0; c < chosen.ranks.size(); ++c) {
+    bases.push_back(sampler.basis(c, chosen.cells[c], chosen.ranks[c]));
+  }
+  result.sample_count += number * static_cast<std::size_t>(kSamples) + far.sample_count;
 }
 
 }  // namespace
@@ -331,7 +435,8 @@ SharedBases sample_bases(const SolvedTransfer& solved, const CompressionFrame& f
                          const Progress& progress) {
   load_blas();
   const BasisSampler sampler(solved, frame, cells);
-  SharedBases result{.patches = sampler.patches(), .bases = {}, .step = {}};
+  SharedBases result{
+      .patches = sampler.patches(), .bases = {}, .group = sampler.group(), .step = {}};
   const double count = solved.matrix_count();
   // Errors count on both sides, and in every channel.
   const double allowed = tolerance * tolerance / 2 / kChannelCount;

@@ -5,6 +5,9 @@
 
 namespace rebounce {
 
+namespace {
+
+/// Groups by role alone, [n] or empty.
 std::vector<std::uint8_t> role_groups(const PatchRoles& roles) {
   const std::size_t n = roles.role.size();
   const bool fewer_receivers =
@@ -16,6 +19,19 @@ std::vector<std::uint8_t> role_groups(const PatchRoles& roles) {
   std::vector<std::uint8_t> groups;
   groups.reserve(n);
   for (const std::uint8_t role : roles.role) groups.push_back(group[role]);
+  return groups;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> tree_groups(const PatchRoles& roles,
+                                      std::span<const std::uint8_t> group) {
+  std::vector<std::uint8_t> groups = role_groups(roles);
+  if (group.empty()) return groups;
+  groups.resize(group.size());
+  for (std::size_t p = 0; p < group.size(); ++p) {
+    groups[p] = static_cast<std::uint8_t>(groups[p] * kMostPatchGroups + group[p]);
+  }
   return groups;
 }
 

@@ -10,11 +10,11 @@
 
 namespace rebounce {
 
-/// Groups of patches by role, [n], for a cluster tree whose blocks are wanted or not as a whole;
-/// empty if all patches have both roles. The order is: both roles; receivers or sources alone,
-/// whichever are fewer; the others of these two; no role. A wanted block below the diagonal then
-/// has no columns of the last two groups.
-std::vector<std::uint8_t> role_groups(const PatchRoles& roles);
+/// Groups of patches by role, [n], for a cluster tree whose blocks are wanted or not as a whole,
+/// and within a role by `group` (SymmetricMatrix::group); empty if all patches are alike. The order
+/// is: both roles; receivers or sources alone, whichever are fewer; the others of these two; no
+/// role. A wanted block below the diagonal then has no columns of the last two roles.
+std::vector<std::uint8_t> tree_groups(const PatchRoles& roles, std::span<const std::uint8_t> group);
 
 /// The blocks of an operator over a cluster tree that its roles need: rows of receivers and columns
 /// of sources. Light still passes by all patches.

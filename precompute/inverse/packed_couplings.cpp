@@ -50,8 +50,7 @@ void append_group(std::span<const float> values, double step, PackedCouplings& b
   }
 }
 
-void pack(const Eigen::Ref<const MatrixXf, 0, Eigen::OuterStride<>>& coupling, double step,
-          PackedCouplings& bytes) {
+void pack(const Eigen::Ref<const MatrixXf>& coupling, double step, PackedCouplings& bytes) {
   for (Index column = 0; column < coupling.cols(); ++column) {
     const float* const values = coupling.data() + column * coupling.outerStride();
     for (Index row = 0; row < coupling.rows(); row += kGroup) {
@@ -117,7 +116,7 @@ MatrixXf unpack_coupling(const SharedBases& bases, std::size_t matrix, std::size
       couplings.data() +
       read<std::uint64_t>(couplings.data() + (matrix * others + d - c) * sizeof(std::uint64_t));
   const auto step = static_cast<float>(bases.step[matrix]);
-  MatrixXf coupling(bases.rank(matrix, d), bases.rank(matrix, c));
+  MatrixXf coupling(bases.coupled_rank(matrix, d, c), bases.coupled_rank(matrix, c, d));
   for (Index column = 0; column < coupling.cols(); ++column) {
     for (Index row = 0; row < coupling.rows(); row += kGroup) {
       bytes = unpack_group(bytes, std::min(kGroup, coupling.rows() - row), step,

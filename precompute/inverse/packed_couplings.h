@@ -21,7 +21,7 @@ using PackedCouplings = std::vector<std::uint8_t>;
 PackedCouplings pack_couplings(const SharedBases& bases, std::size_t cell,
                                std::span<const float> couplings);
 
-/// C_dc for d >= c, [rank of d][rank of c], from the packed couplings of c.
+/// C_dc for d >= c, [coupled rank of d][coupled rank of c], from the packed couplings of c.
 Eigen::MatrixXf unpack_coupling(const SharedBases& bases, std::size_t matrix, std::size_t d,
                                 std::size_t c, const PackedCouplings& couplings);
 

@@ -46,9 +46,11 @@ void SolvedMatrix::add_later_bounces(std::uint32_t matrix, const Run& row, const
   const MatrixXf coupling =
       unpack_coupling(bases_, matrix, mirrored ? column.cell : row.cell, low, couplings_[low]);
   auto part = entries.block(row.begin, column.begin, row.vectors.rows(), column.vectors.rows());
-  const MatrixXf right = mirrored ? MatrixXf(coupling.transpose() * column.vectors.transpose())
-                                  : MatrixXf(coupling * column.vectors.transpose());
-  part.noalias() += row.vectors * right;
+  const auto of_row = row.vectors.leftCols(mirrored ? coupling.cols() : coupling.rows());
+  const auto of_column = column.vectors.leftCols(mirrored ? coupling.rows() : coupling.cols());
+  const MatrixXf right = mirrored ? MatrixXf(coupling.transpose() * of_column.transpose())
+                                  : MatrixXf(coupling * of_column.transpose());
+  part.noalias() += of_row * right;
 }
 
 void SolvedMatrix::add_later_bounces(std::uint32_t matrix, std::span<const std::uint32_t> rows,

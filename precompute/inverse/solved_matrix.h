@@ -8,6 +8,7 @@
 
 #include "precompute/base/symmetric_matrix.h"
 #include "precompute/inverse/packed_couplings.h"
+#include "precompute/inverse/patch_groups.h"
 #include "precompute/inverse/shared_bases.h"
 #include "precompute/inverse/solved_transfer.h"
 
@@ -18,8 +19,11 @@ namespace rebounce {
 class SolvedMatrix final : public SymmetricMatrix {
  public:
   /// `solved` must outlive the object; `energies` [n] are those that it estimates with these roles.
+  /// Groups of patches are those of group_patches.
   SolvedMatrix(const SolvedTransfer& solved, Eigen::VectorXd energies, PatchRoles roles)
-      : SymmetricMatrix(std::move(roles)), solved_(solved), energies_(std::move(energies)) {}
+      : SymmetricMatrix(std::move(roles), group_patches(solved.form_factors())),
+        solved_(solved),
+        energies_(std::move(energies)) {}
 
   std::span<const float> area() const override { return solved_.area(); }
   std::uint32_t matrix_count() const override { return solved_.matrix_count(); }

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -20,9 +22,8 @@ namespace {
 
 using Lights = std::vector<std::vector<Float3>>;
 
-/// A room of 4 x 3 x 5 m with a block, of three channels.
 struct Room : test::SolvedRoom {
-  Room() : SolvedRoom(test::room_with_block({0.8F, 0.6F, 0.3F}), 1300) {}
+  Room(const Scene& scene, std::size_t patch_count) : SolvedRoom(scene, patch_count) {}
 
   std::shared_ptr<const HierarchicalOperator> form_factors =
       test::dense_blocks(exchange, patches.area);
@@ -30,33 +31,54 @@ struct Room : test::SolvedRoom {
   Lights training = test::unshadowed_lights(patches, 24, 1, 1.6, 1.2);
 };
 
+/// A room of 4 x 3 x 5 m with a block, of three channels.
 const Room& room() {
-  static const Room made;
+  static const Room made(test::room_with_block({0.8F, 0.6F, 0.3F}), 1300);
   return made;
 }
 
-/// The bases of the room at a tolerance, and the matrix in them.
-struct Sampled {
-  explicit Sampled(double tolerance, const PatchRoles& roles = {})
-      : matrix(room().solved, room().solved.estimated_energies(roles), roles),
-        frame(compression_frame(matrix, room().patches, room().training)),
-        cells(clusters_up_to(frame.tree, kBasisCell)),
-        bases(sample_bases(room().solved, frame, cells, tolerance)) {}
+/// Two rooms of 4 x 2.6 x 4 m, with a gap at the end of the wall between them or none. Patches of
+/// a slab under the house have no light.
+const Room& two_rooms(bool with_gap) {
+  const auto make = [](double end) {
+    Scene scene = test::empty_scene({0.8F, 0.6F, 0.3F});
+    test::add_box(scene, {0, 0, 0}, {8.2, 2.6, 4}, true);
+    test::add_box(scene, {4, 0, 0}, {4.2, 2.6, end}, false);
+    test::add_box(scene, {-0.1, -0.2, -0.1}, {8.3, -0.1, 4.1}, false);
+    return Room(scene, 1800);
+  };
+  static const Room open = make(3.2), closed = make(4);
+  return with_gap ? open : closed;
+}
 
-  void solve() {
+/// The bases of a room at a tolerance, and the matrix in them.
+struct Sampled {
+  explicit Sampled(double tolerance, const PatchRoles& with = {}, const Room& of_room = room(),
+                   std::uint32_t cell_size = kBasisCell)
+      : of(of_room),
+        matrix(of.solved, of.solved.estimated_energies(with), with),
+        frame(compression_frame(matrix, of.patches, of.training)),
+        cells(clusters_up_to(frame.tree, cell_size)),
+        bases(sample_bases(of.solved, frame, cells, tolerance)) {}
+
+  /// Returns the number of solves.
+  std::size_t solve() {
     const BlockCheckpoint none;
-    CouplingSolver solver(room().solved, bases, {frame, cells}, 2, none);
+    CouplingSolver solver(of.solved, bases, {frame, cells}, 2, none);
+    const std::size_t count = solver.solve_count();
     matrix.set_entries(bases, solver.run({}));
+    return count;
   }
 
   Eigen::Index rank() const {
     Eigen::Index sum = 0;
     for (std::size_t m = 0; m < bases.bases.size(); ++m) {
-      sum += bases.ranks_between(m, 0, bases.cell_count());
+      for (std::size_t c = 0; c < bases.cell_count(); ++c) sum += bases.rank(m, c);
     }
     return sum;
   }
 
+  const Room& of;
   SolvedMatrix matrix;
   CompressionFrame frame;
   std::vector<std::uint32_t> cells;
@@ -74,8 +96,8 @@ Eigen::MatrixXf entries_of(const SymmetricMatrix& matrix, std::uint32_t channel)
 
 /// The root mean square over lights of the frame of the relative error of indirect light.
 double error_of(const Sampled& sampled) {
-  const DenseMatrix dense(*room().dense);
-  const auto n = static_cast<Eigen::Index>(room().patches.size());
+  const DenseMatrix dense(*sampled.of.dense);
+  const auto n = static_cast<Eigen::Index>(sampled.of.patches.size());
   Eigen::MatrixXf lights(n, sampled.frame.sample.cols() - 1);  // the uniform light is stronger
   for (Eigen::Index k = 0; k < n; ++k) {
     lights.row(sampled.frame.tree.patch[k]) =
@@ -154,6 +176,75 @@ TEST(SampledBases, CellsWithoutARoleHaveNone) {
     ++empty;
   }
   EXPECT_GT(empty, 0U);
+}
+
+constexpr std::uint32_t kSmallCell = 64;
+
+/// The number of patches in the cells of each group that are in each of the two rooms.
+std::array<std::array<int, 2>, 2> patches_in_rooms(const Sampled& sampled) {
+  std::array<std::array<int, 2>, 2> count{};
+  for (std::size_t c = 0; c < sampled.bases.cell_count(); ++c) {
+    for (const std::uint32_t p : sampled.bases.patches[c]) {
+      const Float3& at = sampled.of.patches.centroid[p];
+      const bool is_inside = at[1] >= 0 && at[1] <= 2.6F && at[2] >= 0 && at[2] <= 4;
+      if (is_inside && at[0] >= 0 && at[0] <= 8.2F) ++count[sampled.bases.group[c]][at[0] > 4.1F];
+    }
+  }
+  return count;
+}
+
+TEST(SampledBases, RoomsBehindADoorAreGroups) {
+  for (const double tolerance : {0.0005, 0.003, 0.02}) {
+    SCOPED_TRACE(tolerance);
+    Sampled sampled(tolerance, {}, two_rooms(true), kSmallCell);
+    const SharedBases& bases = sampled.bases;
+    for (const auto& [low, high] : patches_in_rooms(sampled)) {
+      EXPECT_GT(low + high, 500);
+      EXPECT_LT(std::min(low, high), 16) << "more than the alignment of clusters";
+    }
+    std::size_t couplings = 0;
+    Eigen::Index far = 0;
+    for (std::size_t c = 0; c < bases.cell_count(); ++c) {
+      couplings += bases.coupling_count(c);
+      for (std::size_t m = 0; m < bases.bases.size(); ++m) {
+        EXPECT_LE(bases.bases[m][c].far_rank, bases.rank(m, c));
+        far += bases.bases[m][c].far_rank;
+      }
+    }
+    EXPECT_GT(far, 0);
+    EXPECT_LT(far, sampled.rank() / 2);
+    const auto rank = static_cast<std::size_t>(sampled.rank());
+    EXPECT_LT(couplings, rank * rank / 3 * 4 / 10) << "as many as of one group";
+    EXPECT_LT(sampled.solve(), rank * 8 / 10) << "as many as there are vectors";
+    const double error = error_of(sampled);
+    RecordProperty("error of " + std::to_string(tolerance), std::to_string(error));
+    EXPECT_LT(error, 1.3 * tolerance);
+  }
+}
+
+TEST(SampledBases, RoomsWithoutADoorShareNearlyNothing) {
+  Sampled sampled(0.003, {}, two_rooms(false), kSmallCell);
+  EXPECT_EQ(std::ranges::max(sampled.bases.group), 1U);
+  Eigen::Index far = 0;  // of cells that have a few patches of the other room, by alignment
+  for (const std::vector<SharedBases::Basis>& cells : sampled.bases.bases) {
+    for (const SharedBases::Basis& basis : cells) far += basis.far_rank;
+  }
+  EXPECT_LT(far, sampled.rank() / 10);
+  sampled.solve();
+  const double error = error_of(sampled);
+  RecordProperty("error", std::to_string(error));
+  EXPECT_LT(error, 1.3 * 0.003);
+}
+
+TEST(SampledBases, EveryDirectionIsFarWhereNothingMayBeLost) {
+  Sampled sampled(1e-7, {}, two_rooms(true), kSmallCell);
+  std::size_t full = 0;
+  for (const std::vector<SharedBases::Basis>& cells : sampled.bases.bases) {
+    for (const SharedBases::Basis& basis : cells) full += basis.far_rank == basis.vectors.rows();
+  }
+  EXPECT_GT(full, 0U);
+  sampled.solve();
+  EXPECT_LT(error_of(sampled), 1e-4) << "the solves are in single precision";
 }
 
 TEST(ClusterTree, ClustersUpToASizeCoverAllPositionsInOrder) {

@@ -12,7 +12,7 @@ namespace {
 
 /// Bases of two matrices over three cells; only their ranks matter.
 SharedBases bases_of_step(double step) {
-  SharedBases bases{.patches = {{0}, {1}, {2}}, .bases = {}, .step = {step, 2 * step}};
+  SharedBases bases{.patches = {{0}, {1}, {2}}, .bases = {}, .group = {}, .step = {step, 2 * step}};
   for (const std::vector<Eigen::Index>& ranks :
        {std::vector<Eigen::Index>{40, 7, 0}, {17, 33, 1}}) {
     std::vector<SharedBases::Basis>& cells = bases.bases.emplace_back();
