@@ -121,6 +121,7 @@ std::vector<std::size_t> groups_in(const MatrixXd& vectors) {
 }  // namespace
 
 std::vector<std::uint8_t> group_patches(const HierarchicalMatrix& form_factors) {
+  if (form_factors.patch().size() < 2 * kFewestPatches) return {};
   const MatrixXd vectors = lasting_light(form_factors);
   if (vectors.cols() <= 1) return {};
   const std::vector<std::size_t> of_position = groups_in(vectors);
