@@ -8,6 +8,7 @@ on from the checkpoint, to the same bytes.
 Usage: ranks.py PROGRAM WORK [--moments N] [--stages N] [--most RANKS] [--seed S]
 """
 
+import contextlib
 import os
 import pathlib
 import shutil
@@ -44,6 +45,20 @@ def errors_of(process):
         raise
 
 
+def wait_after_kill(process):
+    """Waits for the end of all ranks.
+
+    The mpirun of Open MPI 4.1 may wait for a lock of its own for ever if a rank is killed while it
+    joins. Then it is killed too, but only when no rank is left that it could end.
+    """
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process.communicate(timeout=10)
+    if process.poll() is None and not any(is_running(pid) for pid in children_of(process)):
+        print("mpirun hangs after the end of all ranks", flush=True)
+        process.kill()
+    errors_of(process)
+
+
 def run(count, program, folder):
     process = begin(count, program, folder)
     text = errors_of(process)
@@ -60,22 +75,37 @@ def rank_of(pid):
     return next((int(e[len(name):]) for e in entries if e.startswith(name)), None)
 
 
+def children_of(process):
+    return pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+
+
 def find_rank(process, rank):
     """The process of a rank as soon as there is one; None if the run ends before."""
     while process.poll() is None:
-        children = pathlib.Path(f"/proc/{process.pid}/task/{process.pid}/children")
-        for pid in children.read_text().split():
+        for pid in children_of(process):
             if rank_of(pid) == rank:
                 return int(pid)
         time.sleep(0.005)
     return None
 
 
+def state_of(pid):
+    """The fields of /proc/PID/stat from the state on; None if the process is gone."""
+    try:
+        return pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    except OSError:
+        return None
+
+
+def is_running(pid):
+    fields = state_of(pid)
+    return fields is not None and fields[0] != "Z"
+
+
 def used(pid):
     """Processor seconds of a process, all its threads; None if it has ended."""
-    try:
-        fields = pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-    except OSError:
+    fields = state_of(pid)
+    if fields is None:
         return None
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
@@ -102,7 +132,10 @@ def kill_and_go_on(program, folder, known, draw, most, moment):
     process = begin(count, program, folder)
     # Of what one process uses, each rank uses a part.
     killed = kill_rank(process, rank, moment / count)
-    errors_of(process)
+    if killed:
+        wait_after_kill(process)
+    else:
+        errors_of(process)
     kills.require(process.returncode != 0 or not killed, f"rank {rank} of {count}: exit status 0")
     kills.check_after_kill(COMMAND, folder, {name: kills.OLDER for name in COMMAND.outputs},
                            known.files)
