@@ -54,6 +54,7 @@ Eigen::VectorXd SymmetricMatrix::energies(std::span<const std::uint32_t> order) 
     const auto columns = part_of(sources, column, kBatchColumns);
     for (std::size_t row = 0; row < receivers.size(); row += kBatchRows) {
       const auto rows = part_of(receivers, row, kBatchRows);
+      if (is_zero(rows, columns)) continue;
       MatrixXf part(rows.size(), columns.size());
       for (std::uint32_t m = 0; m < matrix_count(); ++m) {
         entries(m, rows, columns, part);

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -15,6 +16,11 @@ namespace rebounce {
 
 /// The most groups that the patches of a matrix have.
 inline constexpr std::size_t kMostPatchGroups = 64;
+
+/// Entries between two lists of patches, as the product rows columns^T of narrow matrices.
+struct EntryFactors {
+  Eigen::MatrixXf rows, columns;  ///< [rows][k], [columns][k]
+};
 
 /// What compression reads: a matrix M over the patches for each distinct channel, in its symmetric
 /// form A^1/2 M A^-1/2, where A holds the areas. Usable from any number of threads.
@@ -47,6 +53,19 @@ class SymmetricMatrix {
   /// The entries of each of the matrices.
   virtual std::vector<Eigen::MatrixXf> all_entries(std::span<const std::uint32_t> rows,
                                                    std::span<const std::uint32_t> columns) const;
+
+  /// Whether all entries between two lists are known to be 0, in all of the matrices.
+  virtual bool is_zero(std::span<const std::uint32_t> /*rows*/,
+                       std::span<const std::uint32_t> /*columns*/) const {
+    return false;
+  }
+
+  /// The entries of each of the matrices as products, for lists between which they are known as
+  /// such.
+  virtual std::optional<std::vector<EntryFactors>> factors(
+      std::span<const std::uint32_t> /*rows*/, std::span<const std::uint32_t> /*columns*/) const {
+    return std::nullopt;
+  }
 
   /// The product with many vectors at once, x [n][k]. The bits do not depend on the number of
   /// threads.

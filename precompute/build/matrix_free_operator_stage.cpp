@@ -144,11 +144,14 @@ class LinkedOperator {
   double tolerance() const { return kCompressionPart * decided_.tolerance; }
 
   void find_fitting_lights(const FormFactorLinks& fewer) {
+    // The third digit of the radiosities does not matter here.
+    const auto links = std::make_shared<const LinkedFormFactors>(fewer, data_.patches.area,
+                                                                 data_.patches.centroid);
+    group_ = clock_.run("groups of patches", [&](const Progress& part) {
+      return group_patches(links, data_.patches, part);
+    });
     lights_ = clock_.run("fitting lights", [&](const Progress& part) {
-      // The third digit of the radiosities does not matter here.
-      const ReferenceSolver solver(std::make_shared<const LinkedFormFactors>(
-                                       fewer, data_.patches.area, data_.patches.centroid),
-                                   data_.patches);
+      const ReferenceSolver solver(links, data_.patches);
       return find_lights(tracer_, data_, roles_, decided_.form_factors.seed, solver, part);
     });
     report_.form_factor_tolerance =
@@ -160,7 +163,8 @@ class LinkedOperator {
   void compress_form_factors_of() {
     data_.compressed_form_factors =
         clock_.run("form factor compression", [&](const Progress& part) {
-          return compress_form_factors(links_, data_.patches, std::move(lights_.radiosities),
+          return compress_form_factors(links_, data_.patches, group_,
+                                       std::move(lights_.radiosities),
                                        {report_.form_factor_tolerance, Precision::kF16}, part);
         });
     report_.form_factor_error = form_factor_error(*data_.compressed_form_factors, *links_,
@@ -177,6 +181,7 @@ class LinkedOperator {
     MatrixFreeTransferSettings settings;
     settings.compression = {tolerance(), *decided_.precision};
     settings.roles = roles_;
+    settings.group = std::move(group_);
     settings.memory_limit_bytes =
         memory_of_matrix_free_transfer(build, decided_.memory_limit_bytes);
     settings.checkpoint = decided_.checkpoint;
@@ -249,7 +254,8 @@ class LinkedOperator {
   TransferData& data_;
   BuildReport& report_;
   PhaseClock& clock_;
-  FittedLights lights_;  ///< while form factors are compressed
+  std::vector<std::uint8_t> group_;  ///< of each patch, until the operator is made
+  FittedLights lights_;              ///< while form factors are compressed
   WaitingLights waiting_;
   std::optional<MatrixFreeTransfer> solved_;
   std::optional<CorrectedSolver> solver_;  ///< while lights are checked

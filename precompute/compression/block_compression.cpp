@@ -51,19 +51,73 @@ Spectrum gram_spectrum(const MatrixXd& a) {
   return descending(solver.eigenvectors(), solver.eigenvalues());
 }
 
+/// What the choice of ranks needs to know of a block.
+struct Shape {
+  Index rows, columns, matrix_count;
+  bool on_diagonal;
+
+  explicit Shape(const WideBlock& block)
+      : rows(block.rows()),
+        columns(block.columns()),
+        matrix_count(block.matrix_count),
+        on_diagonal(block.on_diagonal) {}
+  explicit Shape(const FactoredBlock& block)
+      : rows(block.rows()),
+        columns(block.columns()),
+        matrix_count(block.matrix_count()),
+        on_diagonal(false) {}
+};
+
+enum class Digits { kSingle, kDouble };
+
+/// The block times some columns.
+MatrixXd times(const WideBlock& block, const MatrixXf& columns, Digits digits) {
+  if (digits == Digits::kDouble) return block.entries * columns.cast<double>();
+  return MatrixXf(block.entries.cast<float>() * columns).cast<double>();
+}
+
+MatrixXd times(const FactoredBlock& block, const MatrixXf& columns, Digits /*digits*/) {
+  MatrixXd product = MatrixXd::Zero(block.rows(), columns.cols());
+  for (Index m = 0; m < block.matrix_count(); ++m) {
+    const MatrixXd of_matrix =
+        columns.middleRows(m * block.columns(), block.columns()).cast<double>();
+    const MatrixXd within = block.column_factor[m].transpose() * of_matrix;
+    product.noalias() += block.row_factor[m] * within;
+  }
+  return product;
+}
+
+/// The transpose of `rows` times the block.
+MatrixXd in_directions(const MatrixXd& rows, const WideBlock& block) {
+  return rows.transpose() * block.entries;
+}
+
+MatrixXd in_directions(const MatrixXd& rows, const FactoredBlock& block) {
+  MatrixXd product(rows.cols(), block.matrix_count() * block.columns());
+  for (Index m = 0; m < block.matrix_count(); ++m) {
+    const MatrixXd within = rows.transpose() * block.row_factor[m];
+    product.middleCols(m * block.columns(), block.columns()).noalias() =
+        within * block.column_factor[m].transpose();
+  }
+  return product;
+}
+
 /// The leading left singular vectors of a block.
 class RowSpectrum : public Spectrum {
  public:
   /// No more than `largest_rank` are wanted. A direction is worth having for the energy `price`.
   RowSpectrum(const WideBlock& block, Index largest_rank, double price, std::uint64_t seed) {
-    const Index sketch_size = largest_rank + kOversampling;
-    if (2 * sketch_size < block.rows()) {
-      sketch(block, random_signs(block.entries.cols(), sketch_size, seed), price);
+    if (2 * (largest_rank + kOversampling) < block.rows()) {
+      sketch(block, block.entries.squaredNorm(), largest_rank, price, seed);
     } else {
       in_range_ = block.entries;
       static_cast<Spectrum&>(*this) = gram_spectrum(in_range_);
       in_range_directions_ = directions;
     }
+  }
+
+  RowSpectrum(const FactoredBlock& block, Index largest_rank, double price, std::uint64_t seed) {
+    sketch(block, block.squared_norm(), largest_rank, price, seed);
   }
 
   /// The block in the first `rank` directions, [rank][matrices x columns].
@@ -72,15 +126,17 @@ class RowSpectrum : public Spectrum {
   }
 
  private:
-  void sketch(const WideBlock& block, const MatrixXf& signs, double price) {
-    const MatrixXd& whole = block.entries;
-    const double energy = whole.squaredNorm();
-    const MatrixXd sample = price > kSinglePrecision * energy
-                                ? MatrixXf(whole.cast<float>() * signs).cast<double>()
-                                : MatrixXd(whole * signs.cast<double>());
+  template <typename Block>
+  void sketch(const Block& block, double energy, Index largest_rank, double price,
+              std::uint64_t seed) {
+    const Shape shape(block);
+    const MatrixXf signs =
+        random_signs(shape.matrix_count * shape.columns, largest_rank + kOversampling, seed);
+    const bool single = price > kSinglePrecision * energy;
+    const MatrixXd sample = times(block, signs, single ? Digits::kSingle : Digits::kDouble);
     const MatrixXd range = Eigen::HouseholderQR<MatrixXd>(sample).householderQ() *
                            MatrixXd::Identity(sample.rows(), sample.cols());
-    in_range_.noalias() = range.transpose() * whole;
+    in_range_ = in_directions(range, block);
     static_cast<Spectrum&>(*this) = gram_spectrum(in_range_);
     const double lost = std::max(0.0, energy - in_range_.squaredNorm());
     for (double& energy_missing : missing) energy_missing += lost;
@@ -121,17 +177,17 @@ Index cheapest_rank(const Spectrum& spectrum, Index largest, const CompressionCo
 }
 
 /// The size of the bases for each rank.
-double size_per_rank(const WideBlock& block, const CompressionCost& cost) {
-  return block.on_diagonal ? cost.size(block.rows(), 1, 0)
-                           : cost.size(block.rows() + block.columns(), 2, 0);
+double size_per_rank(const Shape& block, const CompressionCost& cost) {
+  return block.on_diagonal ? cost.size(block.rows, 1, 0)
+                           : cost.size(block.rows + block.columns, 2, 0);
 }
 
 /// Larger ranks are not tried.
-Index largest_rank_of(const WideBlock& block) {
-  return block.rows() > kLargeBlock ? block.rows() / 4 : block.rows();
+Index largest_rank_of(const Shape& block) {
+  return block.rows > kLargeBlock ? block.rows / 4 : block.rows;
 }
 
-Index largest_worthwhile_rank(const WideBlock& block, const CompressionCost& cost, double limit) {
+Index largest_worthwhile_rank(const Shape& block, const CompressionCost& cost, double limit) {
   const double affordable = limit / (cost.multiplier * size_per_rank(block, cost));
   const Index largest = largest_rank_of(block);
   return affordable < static_cast<double>(largest) ? static_cast<Index>(affordable) : largest;
@@ -139,10 +195,10 @@ Index largest_worthwhile_rank(const WideBlock& block, const CompressionCost& cos
 
 /// The least cost of ranks above `seen`, estimated from the energies of the row directions alone:
 /// those of the columns and the coupling matrices are left out. 0 for blocks that are fast to try.
-double least_cost_beyond(const WideBlock& block, const Spectrum& rows, Index seen,
+double least_cost_beyond(const Shape& block, const Spectrum& rows, Index seen,
                          const CompressionCost& cost) {
   constexpr Index kFewest = 8;
-  if (block.rows() <= kLargeBlock || seen < kFewest) return 0;
+  if (block.rows <= kLargeBlock || seen < kFewest) return 0;
   const auto energy = [&](Index first, Index last) {
     return (rows.missing[first] - rows.missing[last]) / static_cast<double>(last - first);
   };
@@ -165,9 +221,9 @@ double least_cost_beyond(const WideBlock& block, const Spectrum& rows, Index see
   return least;
 }
 
-void truncate_diagonal(const WideBlock& block, const RowSpectrum& rows, Index largest,
+void truncate_diagonal(const Shape& block, const RowSpectrum& rows, Index largest,
                        const CompressionCost& cost, LowRankBlock& result) {
-  const Index m = block.rows(), matrices = block.matrix_count;
+  const Index m = block.rows, matrices = block.matrix_count;
   // Energy that is missing from the rows is missing from the columns too.
   const Index rank = cheapest_rank(rows, largest, cost, 2,
                                    [&](Index k) { return cost.size(m * k, k, matrices * k * k); });
@@ -181,9 +237,9 @@ void truncate_diagonal(const WideBlock& block, const RowSpectrum& rows, Index la
   result.error_squared = rows.missing[rank] + std::max(0.0, projected.squaredNorm() - kept);
 }
 
-void truncate(const WideBlock& block, const RowSpectrum& rows, Index largest,
+void truncate(const Shape& block, const RowSpectrum& rows, Index largest,
               const CompressionCost& cost, LowRankBlock& result) {
-  const Index m = block.rows(), n = block.columns(), matrices = block.matrix_count;
+  const Index m = block.rows, n = block.columns, matrices = block.matrix_count;
   // Half of the size of a coupling matrix counts for the rows, half for the columns.
   const Index row_rank = cheapest_rank(
       rows, largest, cost, 1, [&](Index k) { return cost.size(m * k, k, matrices * k * k / 2); });
@@ -210,22 +266,44 @@ void truncate(const WideBlock& block, const RowSpectrum& rows, Index largest,
   }
 }
 
+template <typename Block>
+BlockAttempt compress_any(const Block& block, const CompressionCost& cost, double limit,
+                          Index largest_rank, std::uint64_t seed) {
+  const Shape shape(block);
+  const Index largest = std::min(largest_rank, largest_worthwhile_rank(shape, cost, limit));
+  const RowSpectrum rows(block, largest, cost.multiplier * size_per_rank(shape, cost), seed);
+  LowRankBlock result;
+  result.on_diagonal = shape.on_diagonal;
+  if (shape.on_diagonal) {
+    truncate_diagonal(shape, rows, largest, cost, result);
+  } else {
+    truncate(shape, rows, largest, cost, result);
+  }
+  BlockAttempt attempt{{}, least_cost_beyond(shape, rows, largest, cost)};
+  if (cost.of(result) < limit) attempt.block = std::move(result);
+  return attempt;
+}
+
 }  // namespace
+
+double FactoredBlock::squared_norm() const {
+  double sum = 0;
+  for (std::size_t m = 0; m < row_factor.size(); ++m) {
+    const MatrixXd of_rows = row_factor[m].transpose() * row_factor[m];
+    const MatrixXd of_columns = column_factor[m].transpose() * column_factor[m];
+    sum += of_rows.cwiseProduct(of_columns).sum();
+  }
+  return sum;
+}
 
 BlockAttempt compress_block(const WideBlock& block, const CompressionCost& cost, double limit,
                             Index largest_rank, std::uint64_t seed) {
-  const Index largest = std::min(largest_rank, largest_worthwhile_rank(block, cost, limit));
-  const RowSpectrum rows(block, largest, cost.multiplier * size_per_rank(block, cost), seed);
-  LowRankBlock result;
-  result.on_diagonal = block.on_diagonal;
-  if (block.on_diagonal) {
-    truncate_diagonal(block, rows, largest, cost, result);
-  } else {
-    truncate(block, rows, largest, cost, result);
-  }
-  BlockAttempt attempt{{}, least_cost_beyond(block, rows, largest, cost)};
-  if (cost.of(result) < limit) attempt.block = std::move(result);
-  return attempt;
+  return compress_any(block, cost, limit, largest_rank, seed);
+}
+
+BlockAttempt compress_block(const FactoredBlock& block, const CompressionCost& cost, double limit,
+                            Index largest_rank, std::uint64_t seed) {
+  return compress_any(block, cost, limit, largest_rank, seed);
 }
 
 }  // namespace rebounce

@@ -18,6 +18,17 @@ struct WideBlock {
   auto matrix(Eigen::Index m) const { return entries.middleCols(m * columns(), columns()); }
 };
 
+/// The same with entries that are products of narrow matrices, off the diagonal.
+struct FactoredBlock {
+  /// Of each matrix: B_m = row_factor[m] column_factor[m]^T, [rows][k] and [columns][k].
+  std::vector<Eigen::MatrixXd> row_factor, column_factor;
+
+  Eigen::Index rows() const { return row_factor.front().rows(); }
+  Eigen::Index columns() const { return column_factor.front().rows(); }
+  Eigen::Index matrix_count() const { return static_cast<Eigen::Index>(row_factor.size()); }
+  double squared_norm() const;
+};
+
 /// B_m ~ row_basis coupling_m column_basis^T. On the diagonal the column basis is empty: it equals
 /// the row basis.
 struct LowRankBlock {
@@ -86,6 +97,10 @@ struct BlockAttempt {
 /// The cost of higher ranks is estimated from how energies fall: the energies of directions follow
 /// a power of their number, fitted to the first half of the directions.
 BlockAttempt compress_block(const WideBlock& block, const CompressionCost& cost, double limit,
+                            Eigen::Index largest_rank, std::uint64_t seed);
+
+/// The same from a sketch alone, for blocks whose sides are several times `largest_rank`.
+BlockAttempt compress_block(const FactoredBlock& block, const CompressionCost& cost, double limit,
                             Eigen::Index largest_rank, std::uint64_t seed);
 
 }  // namespace rebounce

@@ -61,17 +61,21 @@ class PieceCompressor {
         row_(piece.row),
         column_(piece.column),
         row_begin_(tree.clusters[piece.row].begin),
-        column_begin_(tree.clusters[piece.column].begin) {
-    gather(matrix);
+        column_begin_(tree.clusters[piece.column].begin),
+        matrix_(matrix) {}
+
+  BlockPart compress() {
+    if (loop_.look() || !wanted_.wanted(row_, column_)) return {};
+    if (std::optional<BlockPart> part = compress_factors()) return std::move(*part);
+    gather();
+    return compress(row_, column_);
   }
 
-  BlockPart compress() const { return compress(row_, column_); }
-
  private:
-  void gather(const SymmetricMatrix& matrix) {
+  void gather() {
     const Cluster &row = tree_.clusters[row_], &column = tree_.clusters[column_];
     const auto rows = patches_of(tree_, row), columns = patches_of(tree_, column);
-    matrices_ = matrix.all_entries(rows, columns);
+    matrices_ = matrix_.all_entries(rows, columns);
     for (Eigen::MatrixXf& entries : matrices_) {
       wanted_.clear_unwanted(rows, columns, entries);
       // Positions at the end of a cluster may hold no patch.
@@ -80,6 +84,33 @@ class PieceCompressor {
       padded.topLeftCorner(entries.rows(), entries.cols()) = entries;
       entries = std::move(padded);
     }
+  }
+
+  /// The piece as one block, if that is all it needs and its entries are known without being read.
+  std::optional<BlockPart> compress_factors() const {
+    const Cluster &row = tree_.clusters[row_], &column = tree_.clusters[column_];
+    const auto rows = patches_of(tree_, row), columns = patches_of(tree_, column);
+    if (matrix_.is_zero(rows, columns)) {
+      return zero_part(place_of(row_, column_), multiplier_ * sizes_.block);
+    }
+    if (row_ == column_ || wanted_.is_mixed(row_) || wanted_.is_mixed(column_)) return std::nullopt;
+    const auto factors = matrix_.factors(rows, columns);
+    if (!factors) return std::nullopt;
+    const auto weighted = [](const Eigen::MatrixXf& factor, Index positions,
+                             const ClusterWeight* weight) {
+      Eigen::MatrixXd padded = Eigen::MatrixXd::Zero(positions, factor.cols());
+      padded.topRows(factor.rows()) = factor.cast<double>();
+      if (weight != nullptr) weight->weigh_rows(padded);
+      return padded;
+    };
+    FactoredBlock block;
+    for (const EntryFactors& of_matrix : *factors) {
+      block.row_factor.push_back(weighted(of_matrix.rows, row.count, weight_of(row_, column_)));
+      block.column_factor.push_back(
+          weighted(of_matrix.columns, column.count, weight_of(column_, row_)));
+    }
+    BlockAttempt attempt;
+    return compress_smooth(block, block.squared_norm(), {row_, column_}, attempt);
   }
 
   Index matrix_count() const { return static_cast<Index>(matrices_.size()); }
@@ -126,37 +157,63 @@ class PieceCompressor {
     return row != column && wanted_.leads(row, column) && wanted_.leads(column, row) ? 2 : 1;
   }
 
+  TransferBlock place_of(std::uint32_t row, std::uint32_t column) const {
+    const Cluster &rows = tree_.clusters[row], &columns = tree_.clusters[column];
+    return {.row_begin = rows.begin,
+            .row_count = rows.count,
+            .column_begin = columns.begin,
+            .column_count = columns.count};
+  }
+
+  CompressionCost cost_of(std::uint32_t row, std::uint32_t column) const {
+    return {.multiplier = multiplier_, .multiplicity = multiplicity(row, column), .sizes = sizes_};
+  }
+
+  static std::uint64_t seed_of(const TransferBlock& place) {
+    return (std::uint64_t{place.row_begin} << 32) + place.column_begin + place.row_count;
+  }
+
+  /// A block of this energy as zero or as smooth, if it is; what was tried is in `attempt`.
+  template <typename Block>
+  std::optional<BlockPart> compress_smooth(const Block& block, double energy, const BlockPiece& at,
+                                           BlockAttempt& attempt) const {
+    const TransferBlock place = place_of(at.row, at.column);
+    const CompressionCost cost = cost_of(at.row, at.column);
+    const double overhead = multiplier_ * sizes_.block;
+    const double zero_cost = cost.total(energy, sizes_.block);
+    if (zero_cost <= 2 * overhead) return zero_part(place, zero_cost);
+    const Index smooth = std::min(block.rows(), block.columns()) / kSmoothPart;
+    if (smooth == 0 || are_leaves(at.row, at.column)) return std::nullopt;
+    attempt = compress_block(block, cost, zero_cost - overhead, smooth, seed_of(place));
+    const bool is_smooth = attempt.block && attempt.block->row_basis.cols() < smooth &&
+                           attempt.block->column_basis.cols() < smooth;
+    if (!is_smooth) return std::nullopt;
+    return low_rank_part(place, *attempt.block, at.row, at.column, cost);
+  }
+
+  bool are_leaves(std::uint32_t row, std::uint32_t column) const {
+    return tree_.clusters[row].is_leaf() && tree_.clusters[column].is_leaf();
+  }
+
   BlockPart compress(std::uint32_t row, std::uint32_t column) const {
     if (loop_.look() || !wanted_.wanted(row, column)) return {};
     if (wanted_.is_mixed(row) || wanted_.is_mixed(column)) return compress_children(row, column);
-    const Cluster &rows = tree_.clusters[row], &columns = tree_.clusters[column];
-    const TransferBlock place{.row_begin = rows.begin,
-                              .row_count = rows.count,
-                              .column_begin = columns.begin,
-                              .column_count = columns.count};
+    const TransferBlock place = place_of(row, column);
     const double overhead = multiplier_ * sizes_.block;
     if (is_zero(place)) return zero_part(place, overhead);
     const WideBlock block = weighted_block(place, row, column);
-    const CompressionCost cost{
-        .multiplier = multiplier_, .multiplicity = multiplicity(row, column), .sizes = sizes_};
-    const double zero_cost = cost.total(block.entries.squaredNorm(), sizes_.block);
-    if (zero_cost <= 2 * overhead) return zero_part(place, zero_cost);
-    const std::uint64_t seed = (std::uint64_t{rows.begin} << 32) + columns.begin + rows.count;
-    const bool leaves = rows.is_leaf() && columns.is_leaf();
-    const Index smooth = std::min(block.rows(), block.columns()) / kSmoothPart;
+    const CompressionCost cost = cost_of(row, column);
+    const double energy = block.entries.squaredNorm();
     BlockAttempt attempt;
-    if (!leaves && smooth > 0) {
-      attempt = compress_block(block, cost, zero_cost - overhead, smooth, seed);
-      if (attempt.block && attempt.block->row_basis.cols() < smooth &&
-          attempt.block->column_basis.cols() < smooth) {
-        return low_rank_part(place, *attempt.block, row, column, cost);
-      }
+    if (std::optional<BlockPart> part = compress_smooth(block, energy, {row, column}, attempt)) {
+      return std::move(*part);
     }
-    BlockPart best = leaves ? dense_part(place) : compress_children(row, column);
+    BlockPart best = are_leaves(row, column) ? dense_part(place) : compress_children(row, column);
+    const double zero_cost = cost.total(energy, sizes_.block);
     if (zero_cost <= best.cost) best = zero_part(place, zero_cost);
     const double limit = best.cost - overhead;
     if (attempt.least_beyond < limit) {
-      attempt = compress_block(block, cost, limit, block.rows(), seed);
+      attempt = compress_block(block, cost, limit, block.rows(), seed_of(place));
     } else if (attempt.block && cost.of(*attempt.block) >= limit) {
       return best;
     }
@@ -241,6 +298,7 @@ class PieceCompressor {
   const PartSizes& sizes_;
   double multiplier_;
   std::uint32_t row_, column_, row_begin_, column_begin_;
+  const SymmetricMatrix& matrix_;
   std::vector<Eigen::MatrixXf> matrices_;
 };
 

@@ -20,13 +20,15 @@ constexpr std::uint32_t kCouplingLayout = 1;
 std::string identity_of_couplings(const HierarchicalOperator& form_factors,
                                   const PatchTable& patches,
                                   std::span<const std::vector<Float3>> training,
-                                  const PatchRoles& roles, std::span<const double> numbers) {
+                                  const MatrixFreeTransferSettings& settings,
+                                  std::span<const double> numbers) {
   Identity identity;
   const HierarchicalStorage& f = form_factors.storage();
   identity.add(std::span(&kCouplingLayout, 1), numbers, f.blocks, f.values_f32.span(),
                f.values_f16.span(), f.bases_q8.span(), f.packed_couplings.span(), f.row_format,
                f.patch);
-  identity.add(patches.area, patches.centroid, patches.normal, patches.reflectance, roles.role);
+  identity.add(patches.area, patches.centroid, patches.normal, patches.reflectance,
+               settings.roles.role, settings.group);
   for (const std::vector<Float3>& light : training) identity.add(light);
   return identity.text();
 }

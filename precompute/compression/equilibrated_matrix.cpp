@@ -28,6 +28,22 @@ std::vector<Eigen::MatrixXf> EquilibratedMatrix::all_entries(
   return all;
 }
 
+std::optional<std::vector<EntryFactors>> EquilibratedMatrix::factors(
+    std::span<const std::uint32_t> rows, std::span<const std::uint32_t> columns) const {
+  std::optional<std::vector<EntryFactors>> all = matrix_.factors(rows, columns);
+  const auto scale = [&](std::span<const std::uint32_t> patches, Eigen::MatrixXf& factor) {
+    for (std::size_t k = 0; k < patches.size(); ++k) {
+      factor.row(static_cast<Eigen::Index>(k)) *= inverse_[patches[k]];
+    }
+  };
+  if (!all) return all;
+  for (EntryFactors& of_matrix : *all) {
+    scale(rows, of_matrix.rows);
+    scale(columns, of_matrix.columns);
+  }
+  return all;
+}
+
 void EquilibratedMatrix::equilibrate(std::span<const std::uint32_t> rows,
                                      std::span<const std::uint32_t> columns,
                                      Eigen::Ref<Eigen::MatrixXf> entries) const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -28,6 +29,12 @@ class EquilibratedMatrix final : public SymmetricMatrix {
                Eigen::Ref<Eigen::MatrixXf> entries) const override;
   std::vector<Eigen::MatrixXf> all_entries(std::span<const std::uint32_t> rows,
                                            std::span<const std::uint32_t> columns) const override;
+  bool is_zero(std::span<const std::uint32_t> rows,
+               std::span<const std::uint32_t> columns) const override {
+    return matrix_.is_zero(rows, columns);
+  }
+  std::optional<std::vector<EntryFactors>> factors(
+      std::span<const std::uint32_t> rows, std::span<const std::uint32_t> columns) const override;
   Eigen::MatrixXf multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const override;
 
  private:

@@ -5,6 +5,7 @@
 
 #include "precompute/compression/tolerance_search.h"
 #include "precompute/exchange/links/linked_matrix.h"
+#include "precompute/inverse/patch_groups.h"
 #include "precompute/lights/random_lights.h"
 #include "transfer/base/area_norm.h"
 #include "transfer/base/reflection.h"
@@ -29,9 +30,15 @@ std::shared_ptr<const HierarchicalOperator> compress_form_factors(
 
 std::shared_ptr<const HierarchicalOperator> compress_form_factors(
     std::shared_ptr<const LinkedFormFactors> links, const PatchTable& patches,
-    FittingLights radiosities, const HierarchicalSettings& settings, const Progress& progress) {
-  return compress_to_tolerance(LinkedMatrix(std::move(links), patches), patches,
+    std::vector<std::uint8_t> group, FittingLights radiosities,
+    const HierarchicalSettings& settings, const Progress& progress) {
+  return compress_to_tolerance(LinkedMatrix(std::move(links), patches, std::move(group)), patches,
                                std::move(radiosities), without_cluster_bases(settings), progress);
+}
+
+std::vector<std::uint8_t> group_patches(std::shared_ptr<const LinkedFormFactors> links,
+                                        const PatchTable& patches, const Progress& progress) {
+  return group_patches(LinkedMatrix(std::move(links), patches), progress);
 }
 
 FormFactorError form_factor_error(const HierarchicalOperator& compressed,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
@@ -24,10 +25,16 @@ std::shared_ptr<const HierarchicalOperator> compress_form_factors(
     const HierarchicalSettings& settings, const Progress& progress = {});
 
 /// The same from links, without storing the pairs that they stand for. Each multiplier that is
-/// tried reads every entry once; the memory is that of a few pieces of the matrix.
+/// tried reads every entry once; the memory is that of a few pieces of the matrix. Blocks are of
+/// one `group` on each side (group_patches; empty: all patches are of one).
 std::shared_ptr<const HierarchicalOperator> compress_form_factors(
     std::shared_ptr<const LinkedFormFactors> links, const PatchTable& patches,
-    FittingLights radiosities, const HierarchicalSettings& settings, const Progress& progress = {});
+    std::vector<std::uint8_t> group, FittingLights radiosities,
+    const HierarchicalSettings& settings, const Progress& progress = {});
+
+/// The group of each patch, [n], by the form factors that links stand for (patch_groups.h).
+std::vector<std::uint8_t> group_patches(std::shared_ptr<const LinkedFormFactors> links,
+                                        const PatchTable& patches, const Progress& progress = {});
 
 /// Errors of the `compressed` form factors against `exact` ones, for these radiosities B.
 FormFactorError form_factor_error(const HierarchicalOperator& compressed,

@@ -15,6 +15,9 @@ struct MatrixFreeTransferSettings {
   /// Only the transfer from sources to receivers is solved for and stored: for the couplings of
   /// cells of sources or of receivers, whichever are fewer.
   PatchRoles roles{};
+  /// The group of each patch (group_patches), [n]; empty if all are of one. They are those that the
+  /// form factors are compressed with.
+  std::vector<std::uint8_t> group{};
   /// Limit of the memory beside the form factors, bytes; 0: none. A lower limit means fewer
   /// threads: slower, with the same bits.
   std::uint64_t memory_limit_bytes = 0;

@@ -44,10 +44,12 @@ double usual_vectors(std::size_t patch_count) {
 
 using TrainingLights = std::span<const std::vector<Float3>>;
 
-/// Form factors as the steps of solves take them.
+/// Form factors as the steps of solves take them, with patches in the order of all form factors,
+/// which is by `group`.
 HierarchicalStorage coarser(const HierarchicalOperator& form_factors, const PatchTable& patches,
-                            TrainingLights training, double tolerance) {
-  return compress_matrix(HierarchicalMatrix(form_factors.storage()), patches, training,
+                            const std::vector<std::uint8_t>& group, TrainingLights training,
+                            double tolerance) {
+  return compress_matrix(HierarchicalMatrix(form_factors.storage(), group), patches, training,
                          initial_multiplier(kCoarsePart * tolerance, patches.size()));
 }
 
@@ -75,11 +77,11 @@ struct MatrixFreeTransfer::State {
         plan(checked_plan(patches, settings)),
         limited(std::in_place, plan.thread_count),
         couplings_key(
-            identity_of_couplings(form_factors, patches, training, settings.roles,
+            identity_of_couplings(form_factors, patches, training, settings,
                                   {{kBasisPart, kResidualPart, kCoarsePart, tolerance()}})),
-        solved(form_factors, coarser(form_factors, patches, training, tolerance()), patches,
-               kResidualPart * tolerance()),
-        matrix(solved, solved.estimated_energies(settings.roles), settings.roles) {
+        solved(form_factors, coarser(form_factors, patches, settings.group, training, tolerance()),
+               patches, kResidualPart * tolerance()),
+        matrix(solved, solved.estimated_energies(settings.roles), settings.roles, settings.group) {
     limited.reset();
   }
 

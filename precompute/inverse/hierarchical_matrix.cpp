@@ -20,6 +20,9 @@ constexpr std::uint32_t kStrip = 512;
 // Vectors that one thread multiplies with at a time.
 constexpr Index kBatchVectors = 32;
 
+// The least ratio of the sides of factors to their width: wider ones save little (lab/179).
+constexpr Index kSideOverRanks = 8;
+
 /// Computes to = matrix from, or to += matrix from with kAdd. matrix is [rows][columns], the
 /// vectors have `width` columns; all are row-major.
 enum class Write { kSet, kAdd };
@@ -68,8 +71,12 @@ struct HierarchicalMatrix::Places {
   }
 };
 
-HierarchicalMatrix::HierarchicalMatrix(const HierarchicalStorage& storage)
-    : storage_(decode(storage)), layout_(storage_), position_(storage_.patch.size()) {
+HierarchicalMatrix::HierarchicalMatrix(const HierarchicalStorage& storage,
+                                       std::vector<std::uint8_t> group)
+    : SymmetricMatrix({}, std::move(group)),
+      storage_(decode(storage)),
+      layout_(storage_),
+      position_(storage_.patch.size()) {
   if (layout_.cluster_coefficient_count > 0)
     throw Error("hierarchical matrix: blocks with cluster bases are not supported");
   const SharedArray<float> values = std::exchange(storage_.values_f32, {});
@@ -134,6 +141,19 @@ void HierarchicalMatrix::sort_blocks() {
   }
 }
 
+std::vector<std::uint32_t> HierarchicalMatrix::blocks_near(const Places& places) const {
+  std::vector<std::uint32_t> blocks;
+  std::uint32_t before = kNone;
+  for (const auto& place : places.place) {
+    const std::uint32_t strip = place.position / kStrip;
+    if (strip == std::exchange(before, strip)) continue;
+    blocks.insert(blocks.end(), touching_[strip].begin(), touching_[strip].end());
+  }
+  std::ranges::sort(blocks);
+  blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
+  return blocks;
+}
+
 const float* HierarchicalMatrix::basis(const HierarchicalLayout::End& end) const {
   return bases_.data() + layout_.basis_index(end, 0, 0);
 }
@@ -142,75 +162,143 @@ const float* HierarchicalMatrix::coupling(std::uint32_t matrix, std::size_t bloc
   return couplings_[matrix].data() + layout_.block_layouts[block].values / matrix_count();
 }
 
+struct HierarchicalMatrix::Side {
+  Index begin, count;         ///< positions
+  Index first, size;          ///< rows of the vectors that a product reads or writes
+  std::uint32_t cluster = 0;  ///< of a low-rank block
+};
+
+HierarchicalMatrix::Side HierarchicalMatrix::side_of(const TransferBlock& block, std::size_t index,
+                                                     bool row) const {
+  const Index begin = row ? block.row_begin : block.column_begin;
+  const Index count = row ? block.row_count : block.column_count;
+  if (block.kind == TransferBlock::Kind::kDense) return {begin, count, begin, count};
+  const HierarchicalLayout::BlockLayout& block_layout = layout_.block_layouts[index];
+  const HierarchicalLayout::End& end = row ? block_layout.row : block_layout.column;
+  return {begin, count, end.coefficient, row ? block.row_rank : block.column_rank, end.cluster};
+}
+
+struct HierarchicalMatrix::Part {
+  std::size_t block;
+  std::span<const Place> rows, columns;  ///< in the order of the block
+  bool mirrored;                         ///< whether rows of the block are columns of the entries
+};
+
+/// The parts of blocks that two lists of patches meet.
+std::vector<HierarchicalMatrix::Part> HierarchicalMatrix::parts_between(
+    const Places& rows, const Places& columns) const {
+  std::vector<Part> parts;
+  const auto add = [&](std::uint32_t b, const Places& at_rows, const Places& at_columns,
+                       bool mirrored) {
+    const TransferBlock& block = storage_.blocks[b];
+    const Part part{b, at_rows.within(block.row_begin, block.row_count),
+                    at_columns.within(block.column_begin, block.column_count), mirrored};
+    if (!part.rows.empty() && !part.columns.empty()) parts.push_back(part);
+  };
+  for (const std::uint32_t b : blocks_near(columns)) {
+    add(b, rows, columns, false);
+    if (!storage_.blocks[b].on_diagonal()) add(b, columns, rows, true);
+  }
+  return parts;
+}
+
 void HierarchicalMatrix::entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
                                  std::span<const std::uint32_t> columns,
                                  Eigen::Ref<MatrixXf> entries) const {
   entries.setZero();
-  const Places row_places(rows, position_), column_places(columns, position_);
-  std::vector<std::uint32_t> blocks;
-  std::uint32_t before = kNone;
-  for (const auto& place : column_places.place) {
-    const std::uint32_t strip = place.position / kStrip;
-    if (strip == std::exchange(before, strip)) continue;
-    blocks.insert(blocks.end(), touching_[strip].begin(), touching_[strip].end());
-  }
-  std::ranges::sort(blocks);
-  blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
-  for (const std::uint32_t b : blocks) add_block(matrix, b, row_places, column_places, entries);
-}
-
-MatrixXf HierarchicalMatrix::block_entries(std::uint32_t matrix, std::size_t index,
-                                           std::span<const Place> rows,
-                                           std::span<const Place> columns) const {
-  const TransferBlock& block = storage_.blocks[index];
-  MatrixXf entries(rows.size(), columns.size());
-  if (block.kind == TransferBlock::Kind::kDense) {
-    const ConstMap whole(coupling(matrix, index), block.row_count, block.column_count);
-    for (Index j = 0; j < entries.cols(); ++j) {
-      for (Index i = 0; i < entries.rows(); ++i) {
-        entries(i, j) =
-            whole(rows[i].position - block.row_begin, columns[j].position - block.column_begin);
+  const Places at_rows(rows, position_), at_columns(columns, position_);
+  for (const Part& part : parts_between(at_rows, at_columns)) {
+    const MatrixXf values = part_entries(matrix, part);
+    for (std::size_t j = 0; j < part.columns.size(); ++j) {
+      for (std::size_t i = 0; i < part.rows.size(); ++i) {
+        const Index r = part.rows[i].index, c = part.columns[j].index;
+        (part.mirrored ? entries(c, r) : entries(r, c)) =
+            values(static_cast<Index>(i), static_cast<Index>(j));
       }
     }
+  }
+}
+
+/// Rows [rank][places] of the basis of a side of a block.
+Vectors HierarchicalMatrix::basis_at(const HierarchicalLayout::End& end, const Side& side,
+                                     std::span<const Place> places) const {
+  const ConstMap whole(basis(end), side.size, side.count);
+  Vectors part(side.size, static_cast<Index>(places.size()));
+  for (Index k = 0; k < part.cols(); ++k) part.col(k) = whole.col(places[k].position - side.begin);
+  return part;
+}
+
+/// The factors of a part of a block of low rank, [rank of the rows][places] each.
+std::pair<Vectors, Vectors> HierarchicalMatrix::part_factors(std::uint32_t matrix,
+                                                             const Part& part) const {
+  const HierarchicalLayout::BlockLayout& layout = layout_.block_layouts[part.block];
+  const TransferBlock& block = storage_.blocks[part.block];
+  const Vectors v = basis_at(layout.column, side_of(block, part.block, false), part.columns);
+  return {basis_at(layout.row, side_of(block, part.block, true), part.rows),
+          ConstMap(coupling(matrix, part.block), block.row_rank, block.column_rank) * v};
+}
+
+MatrixXf HierarchicalMatrix::part_entries(std::uint32_t matrix, const Part& part) const {
+  const TransferBlock& block = storage_.blocks[part.block];
+  MatrixXf entries(part.rows.size(), part.columns.size());
+  if (block.kind != TransferBlock::Kind::kDense) {
+    const auto [of_rows, of_columns] = part_factors(matrix, part);
+    entries.noalias() = of_rows.transpose() * of_columns;
     return entries;
   }
-  // Rows [rank][size] of a basis at some of its positions.
-  const auto some = [&](const HierarchicalLayout::End& end, std::uint32_t rank, std::uint32_t begin,
-                        std::uint32_t size, std::span<const Place> where) {
-    const ConstMap whole(basis(end), rank, size);
-    Vectors part(rank, static_cast<Index>(where.size()));
-    for (Index k = 0; k < part.cols(); ++k) part.col(k) = whole.col(where[k].position - begin);
-    return part;
-  };
-  const HierarchicalLayout::BlockLayout& block_layout = layout_.block_layouts[index];
-  const Vectors u = some(block_layout.row, block.row_rank, block.row_begin, block.row_count, rows);
-  const Vectors v =
-      some(block_layout.column, block.column_rank, block.column_begin, block.column_count, columns);
-  const MatrixXf right = ConstMap(coupling(matrix, index), block.row_rank, block.column_rank) * v;
-  entries.noalias() = u.transpose() * right;
+  const ConstMap whole(coupling(matrix, part.block), block.row_count, block.column_count);
+  for (Index j = 0; j < entries.cols(); ++j) {
+    for (Index i = 0; i < entries.rows(); ++i) {
+      entries(i, j) = whole(part.rows[i].position - block.row_begin,
+                            part.columns[j].position - block.column_begin);
+    }
+  }
   return entries;
 }
 
-void HierarchicalMatrix::add_block(std::uint32_t matrix, std::size_t index, const Places& rows,
-                                   const Places& columns, Eigen::Ref<MatrixXf> entries) const {
-  const TransferBlock& block = storage_.blocks[index];
-  const auto add = [&](bool mirrored) {
-    const auto at_rows = mirrored ? rows.within(block.column_begin, block.column_count)
-                                  : rows.within(block.row_begin, block.row_count);
-    const auto at_columns = mirrored ? columns.within(block.row_begin, block.row_count)
-                                     : columns.within(block.column_begin, block.column_count);
-    if (at_rows.empty() || at_columns.empty()) return;
-    const MatrixXf part = mirrored ? block_entries(matrix, index, at_columns, at_rows)
-                                   : block_entries(matrix, index, at_rows, at_columns);
-    for (std::size_t j = 0; j < at_columns.size(); ++j) {
-      for (std::size_t i = 0; i < at_rows.size(); ++i) {
-        const auto r = static_cast<Index>(i), c = static_cast<Index>(j);
-        entries(at_rows[i].index, at_columns[j].index) = mirrored ? part(c, r) : part(r, c);
-      }
+/// Whether a part of a dense block is 0 in all matrices.
+bool HierarchicalMatrix::is_dark(const Part& part) const {
+  for (std::uint32_t m = 0; m < matrix_count(); ++m) {
+    if (!part_entries(m, part).isZero(0)) return false;
+  }
+  return true;
+}
+
+std::optional<std::vector<EntryFactors>> HierarchicalMatrix::factors(
+    std::span<const std::uint32_t> rows, std::span<const std::uint32_t> columns) const {
+  const Places at_rows(rows, position_), at_columns(columns, position_);
+  std::vector<Part> parts;
+  Index width = 0;
+  for (const Part& part : parts_between(at_rows, at_columns)) {
+    const TransferBlock& block = storage_.blocks[part.block];
+    if (block.kind == TransferBlock::Kind::kDense) {
+      if (!is_dark(part)) return std::nullopt;
+      continue;
     }
-  };
-  add(false);
-  if (!block.on_diagonal()) add(true);
+    parts.push_back(part);
+    width += block.row_rank;
+  }
+  if (width * kSideOverRanks > static_cast<Index>(std::min(rows.size(), columns.size()))) {
+    return std::nullopt;
+  }
+  std::vector<EntryFactors> all;
+  for (std::uint32_t m = 0; m < matrix_count(); ++m) {
+    all.push_back({MatrixXf::Zero(rows.size(), width), MatrixXf::Zero(columns.size(), width)});
+    Index first = 0;
+    const auto place = [&](const Vectors& from, std::span<const Place> places, MatrixXf& to) {
+      for (std::size_t k = 0; k < places.size(); ++k) {
+        to.row(places[k].index).segment(first, from.rows()) =
+            from.col(static_cast<Index>(k)).transpose();
+      }
+    };
+    for (const Part& part : parts) {
+      const auto [of_rows, of_columns] = part_factors(m, part);
+      place(of_rows, part.rows, part.mirrored ? all.back().columns : all.back().rows);
+      place(of_columns, part.columns, part.mirrored ? all.back().rows : all.back().columns);
+      first += of_rows.rows();
+    }
+  }
+  return all;
 }
 
 void HierarchicalMatrix::multiply(std::uint32_t matrix, const Vectors& x, Vectors& y,
@@ -234,22 +322,6 @@ void HierarchicalMatrix::multiply(std::uint32_t matrix, const Vectors& x, Vector
             workspace.received.row(cluster.coefficient).data(), y.row(cluster.begin).data(), width,
             Write::kAdd);
   }
-}
-
-struct HierarchicalMatrix::Side {
-  Index begin, count;         ///< positions
-  Index first, size;          ///< rows of the vectors that a product reads or writes
-  std::uint32_t cluster = 0;  ///< of a low-rank block
-};
-
-HierarchicalMatrix::Side HierarchicalMatrix::side_of(const TransferBlock& block, std::size_t index,
-                                                     bool row) const {
-  const Index begin = row ? block.row_begin : block.column_begin;
-  const Index count = row ? block.row_count : block.column_count;
-  if (block.kind == TransferBlock::Kind::kDense) return {begin, count, begin, count};
-  const HierarchicalLayout::BlockLayout& block_layout = layout_.block_layouts[index];
-  const HierarchicalLayout::End& end = row ? block_layout.row : block_layout.column;
-  return {begin, count, end.coefficient, row ? block.row_rank : block.column_rank, end.cluster};
 }
 
 /// Finds the clusters that a coupling matrix brings light to.

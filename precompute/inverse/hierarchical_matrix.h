@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "precompute/base/symmetric_matrix.h"
@@ -16,7 +18,9 @@ class HierarchicalMatrix final : public SymmetricMatrix {
   /// Vectors side by side, row-major: a row for each position, also those that hold no patch.
   using Vectors = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-  explicit HierarchicalMatrix(const HierarchicalStorage& storage);
+  /// `group`: SymmetricMatrix::group.
+  explicit HierarchicalMatrix(const HierarchicalStorage& storage,
+                              std::vector<std::uint8_t> group = {});
 
   std::span<const float> area() const override { return storage_.area; }
   std::uint32_t matrix_count() const override { return storage_.matrix_count; }
@@ -26,6 +30,9 @@ class HierarchicalMatrix final : public SymmetricMatrix {
   void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
                std::span<const std::uint32_t> columns,
                Eigen::Ref<Eigen::MatrixXf> entries) const override;
+  /// Those of blocks of low rank, where there are few.
+  std::optional<std::vector<EntryFactors>> factors(
+      std::span<const std::uint32_t> rows, std::span<const std::uint32_t> columns) const override;
   Eigen::MatrixXf multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const override;
 
   Eigen::Index position_count() const;
@@ -60,16 +67,21 @@ class HierarchicalMatrix final : public SymmetricMatrix {
 
   void fold_scales();
   void sort_blocks();
-  /// The entries of a block in the given rows and columns.
-  Eigen::MatrixXf block_entries(std::uint32_t matrix, std::size_t block,
-                                std::span<const Place> rows, std::span<const Place> columns) const;
-  void add_block(std::uint32_t matrix, std::size_t block, const Places& rows, const Places& columns,
-                 Eigen::Ref<Eigen::MatrixXf> entries) const;
+  /// The blocks, each once and in order, that meet the strips of some positions.
+  std::vector<std::uint32_t> blocks_near(const Places& places) const;
+  /// One side of a block: its positions, its coefficients, and the cluster of its basis.
+  struct Side;
+  Vectors basis_at(const HierarchicalLayout::End& end, const Side& side,
+                   std::span<const Place> places) const;
+  /// A part of a block that two lists of patches meet.
+  struct Part;
+  std::vector<Part> parts_between(const Places& rows, const Places& columns) const;
+  std::pair<Vectors, Vectors> part_factors(std::uint32_t matrix, const Part& part) const;
+  Eigen::MatrixXf part_entries(std::uint32_t matrix, const Part& part) const;
+  bool is_dark(const Part& part) const;
   void find_reached(Workspace& workspace) const;
   void multiply_blocks(std::uint32_t matrix, const Vectors& x, Vectors& y,
                        Workspace& workspace) const;
-  /// One side of a block: its positions, its coefficients, and the cluster of its basis.
-  struct Side;
   Side side_of(const TransferBlock& block, std::size_t index, bool row) const;
   const float* basis(const HierarchicalLayout::End& end) const;
   const float* coupling(std::uint32_t matrix, std::size_t block) const;

@@ -3,12 +3,13 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include "precompute/base/symmetric_matrix.h"
 #include "precompute/inverse/packed_couplings.h"
-#include "precompute/inverse/patch_groups.h"
 #include "precompute/inverse/shared_bases.h"
 #include "precompute/inverse/solved_transfer.h"
 
@@ -19,9 +20,9 @@ namespace rebounce {
 class SolvedMatrix final : public SymmetricMatrix {
  public:
   /// `solved` must outlive the object; `energies` [n] are those that it estimates with these roles.
-  /// Groups of patches are those of group_patches.
-  SolvedMatrix(const SolvedTransfer& solved, Eigen::VectorXd energies, PatchRoles roles)
-      : SymmetricMatrix(std::move(roles), group_patches(solved.form_factors())),
+  SolvedMatrix(const SolvedTransfer& solved, Eigen::VectorXd energies, PatchRoles roles,
+               std::vector<std::uint8_t> group)
+      : SymmetricMatrix(std::move(roles), std::move(group)),
         solved_(solved),
         energies_(std::move(energies)) {}
 
@@ -50,10 +51,24 @@ class SolvedMatrix final : public SymmetricMatrix {
   std::vector<Eigen::MatrixXf> all_entries(std::span<const std::uint32_t> rows,
                                            std::span<const std::uint32_t> columns) const override;
 
+  /// Those between groups of patches: couplings of their cells are between few vectors, and little
+  /// light goes from one to the other directly.
+  std::optional<std::vector<EntryFactors>> factors(
+      std::span<const std::uint32_t> rows, std::span<const std::uint32_t> columns) const override;
+
  private:
   /// Neighbours in a list of patches that lie in the same cell.
   struct Run;
-  std::vector<Run> runs_of(std::uint32_t matrix, std::span<const std::uint32_t> patches) const;
+  enum class Which { kAll, kFar };
+  std::vector<Run> runs_of(std::uint32_t matrix, std::span<const std::uint32_t> patches,
+                           Which vectors = Which::kAll) const;
+  /// Whether no two patches of two lists are in cells of one group.
+  bool are_apart(std::span<const std::uint32_t> rows, std::span<const std::uint32_t> columns) const;
+  /// The coupling between two cells, in any order; all 0 if it is not wanted.
+  Eigen::MatrixXf coupling(std::uint32_t matrix, std::uint32_t row, std::uint32_t column) const;
+  /// Those of later bounces between groups; nothing where they would be wide.
+  std::optional<EntryFactors> far_factors(std::uint32_t matrix, std::span<const std::uint32_t> rows,
+                                          std::span<const std::uint32_t> columns) const;
   void add_later_bounces(std::uint32_t matrix, const Run& row, const Run& column,
                          Eigen::Ref<Eigen::MatrixXf> entries) const;
   /// The same between two lists.

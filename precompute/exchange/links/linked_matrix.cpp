@@ -30,19 +30,13 @@ float dot(const Float3& gradient, const Float3& point, const Float3& center) {
 
 }  // namespace
 
-/// Writes the entries between two lists of patches. It walks down the tree to all nodes that hold a
-/// patch of the shorter list ("near"), and uses those of their links that lead to the other list
-/// ("far").
-class LinkedMatrix::Filler {
+/// The links between two lists of patches. It walks down the tree to all nodes that hold a patch of
+/// the one list ("near"), and finds those of their links that lead to the other list ("far").
+class LinkedMatrix::LinksBetween {
  public:
-  Filler(const LinkedMatrix& matrix, std::span<const std::uint32_t> near,
-         std::span<const std::uint32_t> far, float* entries, Index near_stride, Index far_stride)
-      : matrix_(matrix),
-        near_(members(near)),
-        far_(members(far)),
-        entries_(entries),
-        near_stride_(near_stride),
-        far_stride_(far_stride) {
+  LinksBetween(const LinkedMatrix& matrix, std::span<const std::uint32_t> near,
+               std::span<const std::uint32_t> far)
+      : matrix_(matrix), near_(members(near)), far_(members(far)) {
     if (far_.empty()) return;
     far_begin_ = far_.front().position;
     far_before_.assign(far_.back().position - far_begin_ + 2, 0);
@@ -50,8 +44,11 @@ class LinkedMatrix::Filler {
     for (std::size_t k = 1; k < far_before_.size(); ++k) far_before_[k] += far_before_[k - 1];
   }
 
-  void fill() {
-    if (!far_.empty()) visit(0, near_);
+  /// Calls `follow`(link, node, near, far) with each link, the node that it belongs to, and the
+  /// patches at its two ends, until it returns false.
+  template <typename Follow>
+  void for_each(const Follow& follow) const {
+    if (!far_.empty()) visit(0, near_, follow);
   }
 
  private:
@@ -79,28 +76,30 @@ class LinkedMatrix::Filler {
     return Range(far_).subspan(begin, far_before(node.begin + node.count) - begin);
   }
 
-  void visit(std::uint32_t node, Range near) {
-    if (near.empty()) return;
-    follow_some(matrix_.links_->plain_links(node), node, near);
+  template <typename Follow>
+  bool visit(std::uint32_t node, Range near, const Follow& follow) const {
+    if (near.empty()) return true;
+    if (!follow_some(matrix_.links_->plain_links(node), node, near, follow)) return false;
     const std::span<const IncomingLink> affine = matrix_.links_->affine_links(node);
     for (auto begin = affine.begin(); begin != affine.end();) {
       const auto end =
           std::ranges::upper_bound(begin, affine.end(), gradients_of(*begin), {}, gradients_of);
-      follow_some(std::span<const IncomingLink>{begin, end}, node, near);
+      if (!follow_some(std::span<const IncomingLink>{begin, end}, node, near, follow)) return false;
       begin = end;
     }
     const std::uint32_t child = matrix_.links_->nodes().first_child[node];
-    if (child == kNone) return;
+    if (child == kNone) return true;
     const std::uint32_t second = matrix_.nodes_[child + 1].begin;
     const auto split = std::ranges::lower_bound(near, second, {}, &Member::position) - near.begin();
-    visit(child, near.first(static_cast<std::size_t>(split)));
-    visit(child + 1, near.subspan(static_cast<std::size_t>(split)));
+    return visit(child, near.first(static_cast<std::size_t>(split)), follow) &&
+           visit(child + 1, near.subspan(static_cast<std::size_t>(split)), follow);
   }
 
   /// Follows those links of `node` that lead to far patches. What they lead to is disjoint and in
   /// order.
-  template <typename Link>
-  void follow_some(std::span<const Link> links, std::uint32_t node, Range near) {
+  template <typename Link, typename Follow>
+  bool follow_some(std::span<const Link> links, std::uint32_t node, Range near,
+                   const Follow& follow) const {
     const auto ends_before = [&](const Link& link) {
       const Node& to = matrix_.nodes_[link.from];
       return to.begin + to.count <= far_begin_;
@@ -108,14 +107,39 @@ class LinkedMatrix::Filler {
     for (auto link = std::ranges::partition_point(links, ends_before); link != links.end();
          ++link) {
       if (matrix_.nodes_[link->from].begin > far_.back().position) break;
-      follow(affine(*link), matrix_.nodes_[node], near);
+      const Range far = far_in(matrix_.nodes_[link->from]);
+      if (!far.empty() && !follow(affine(*link), matrix_.nodes_[node], near, far)) return false;
     }
+    return true;
   }
 
-  void follow(const IncomingLink& link, const Node& from, Range near) {
+  const LinkedMatrix& matrix_;
+  std::vector<Member> near_, far_;         ///< by position
+  std::uint32_t far_begin_ = 0;            ///< the first position of far_
+  std::vector<std::uint32_t> far_before_;  ///< far patches before each position from there on
+};
+
+/// Writes the entries between two lists of patches. The near list is the shorter one.
+class LinkedMatrix::Filler {
+ public:
+  Filler(const LinkedMatrix& matrix, std::span<const std::uint32_t> near,
+         std::span<const std::uint32_t> far, float* entries, Index near_stride, Index far_stride)
+      : matrix_(matrix),
+        links_(matrix, near, far),
+        entries_(entries),
+        near_stride_(near_stride),
+        far_stride_(far_stride) {}
+
+  void fill() const {
+    links_.for_each([&](const IncomingLink& link, const Node& node, Range near, Range far) {
+      write(link, node, near, far);
+      return true;
+    });
+  }
+
+ private:
+  void write(const IncomingLink& link, const Node& from, Range near, Range far) const {
     const Node& to = matrix_.nodes_[link.from];
-    const Range far = far_in(to);
-    if (far.empty()) return;
     const Float3 near_gradient = to_floats(link.gradient_to),
                  far_gradient = to_floats(link.gradient_from);
     const auto density = static_cast<float>(1 / (from.area * to.area));
@@ -131,16 +155,17 @@ class LinkedMatrix::Filler {
   }
 
   const LinkedMatrix& matrix_;
-  std::vector<Member> near_, far_;         ///< by position
-  std::uint32_t far_begin_ = 0;            ///< the first position of far_
-  std::vector<std::uint32_t> far_before_;  ///< far patches before each position from there on
+  LinksBetween links_;
   float* entries_;
   Index near_stride_, far_stride_;
 };
 
 LinkedMatrix::LinkedMatrix(std::shared_ptr<const LinkedFormFactors> links,
-                           const PatchTable& patches)
-    : patches_(patches), links_(std::move(links)), position_(patches.size()) {
+                           const PatchTable& patches, std::vector<std::uint8_t> group)
+    : SymmetricMatrix({}, std::move(group)),
+      patches_(patches),
+      links_(std::move(links)),
+      position_(patches.size()) {
   const std::size_t n = patches.size();
   if (links_->patch_count() != n || patches.centroid.size() != n) {
     throw Error("links: they are for another number of patches");
@@ -178,6 +203,17 @@ void LinkedMatrix::entries(std::uint32_t /*matrix*/, std::span<const std::uint32
   } else {
     Filler(*this, columns, rows, entries.data(), entries.outerStride(), 1).fill();
   }
+}
+
+bool LinkedMatrix::is_zero(std::span<const std::uint32_t> rows,
+                           std::span<const std::uint32_t> columns) const {
+  bool found = false;
+  const auto stop = [&](const IncomingLink&, const Node&, Range, Range) {
+    found = true;
+    return false;
+  };
+  LinksBetween(*this, rows, columns).for_each(stop);
+  return !found;
 }
 
 template <typename Columns>

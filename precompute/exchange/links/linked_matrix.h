@@ -16,13 +16,17 @@ namespace rebounce {
 /// link at most.
 class LinkedMatrix final : public SymmetricMatrix {
  public:
-  /// The patches must outlive the object. Throws Error if the links are not of these patches.
-  LinkedMatrix(std::shared_ptr<const LinkedFormFactors> links, const PatchTable& patches);
+  /// The patches must outlive the object; `group`: SymmetricMatrix::group. Throws Error if the
+  /// links are not of these patches.
+  LinkedMatrix(std::shared_ptr<const LinkedFormFactors> links, const PatchTable& patches,
+               std::vector<std::uint8_t> group = {});
 
   std::span<const float> area() const override { return patches_.area; }
   void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
                std::span<const std::uint32_t> columns,
                Eigen::Ref<Eigen::MatrixXf> entries) const override;
+  bool is_zero(std::span<const std::uint32_t> rows,
+               std::span<const std::uint32_t> columns) const override;
   Eigen::MatrixXf multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const override;
 
  private:
@@ -31,6 +35,7 @@ class LinkedMatrix final : public SymmetricMatrix {
     double area = 0;                     ///< m²
     Float3 center{};                     ///< area-weighted, metres
   };
+  class LinksBetween;
   class Filler;
 
   void measure_nodes();

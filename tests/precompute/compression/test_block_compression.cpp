@@ -77,6 +77,40 @@ TEST(BlockCompression, VectorsThatCostMoreAreFewer) {
   }
 }
 
+TEST(BlockCompression, ProductsAreCompressedAsTheirEntriesAre) {
+  constexpr Index kRows = 320, kColumns = 200;
+  FactoredBlock factors;
+  WideBlock entries;
+  entries.matrix_count = 2;
+  entries.entries.resize(kRows, 2 * kColumns);
+  for (const Index rank : {30, 17}) {
+    const auto seed = static_cast<std::uint64_t>(rank);
+    factors.row_factor.push_back(random_orthonormal(kRows, rank, seed));
+    factors.column_factor.push_back(random_orthonormal(kColumns, rank, seed + 1) *
+                                    powers(rank, 2).asDiagonal());
+    entries.entries.middleCols(rank == 30 ? 0 : kColumns, kColumns) =
+        factors.row_factor.back() * factors.column_factor.back().transpose();
+  }
+  EXPECT_NEAR(factors.squared_norm(), entries.entries.squaredNorm(), 1e-9);
+  for (const double multiplier : {1e-5, 1e-8}) {
+    const CompressionCost cost{.multiplier = multiplier};
+    const auto of_factors = compress_block(factors, cost, kNoLimit, 20, 3);
+    const auto of_entries = compress_block(entries, cost, kNoLimit, 20, 3);
+    ASSERT_TRUE(of_factors.block && of_entries.block);
+    EXPECT_EQ(of_factors.block->row_basis.cols(), of_entries.block->row_basis.cols());
+    EXPECT_EQ(of_factors.block->column_basis.cols(), of_entries.block->column_basis.cols());
+    EXPECT_NEAR(of_factors.block->error_squared / of_entries.block->error_squared, 1, 1e-3);
+    double error = 0;
+    for (Index m = 0; m < 2; ++m) {
+      const LowRankBlock& block = *of_factors.block;
+      error += (entries.matrix(m) -
+                block.row_basis * block.couplings[m] * block.column_basis.transpose())
+                   .squaredNorm();
+    }
+    EXPECT_NEAR(of_factors.block->error_squared / error, 1, 1e-6);
+  }
+}
+
 TEST(BlockCompression, RefusesWhatCostsMoreThanTheLimit) {
   const WideBlock block = block_with(200, powers(100, 1));
   const CompressionCost cost{.multiplier = 1e-6};

@@ -5,9 +5,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <random>
 
+#include "precompute/inverse/hierarchical_matrix.h"
 #include "tests/support/solved_room.h"
 #include "tests/support/unshadowed_lights.h"
 #include "transfer/format/hierarchical_encoding.h"
@@ -98,6 +100,41 @@ TEST(MatrixCompression, ALightThatShinesEverywhereLeavesTheScalesAsTheyAre) {
   const auto before = compress(compression, light).exact.scale_exponent;
   compression.add_training_light(ReferenceLighting(matrix, {light}), 0);
   EXPECT_EQ(compress(compression, light).exact.scale_exponent, before);
+}
+
+/// All pairs as one block of low rank: the matrix v v^T.
+HierarchicalOperator one_block(const std::vector<float>& v, const PatchTable& patches) {
+  const auto n = static_cast<std::uint32_t>(v.size());
+  HierarchicalStorage storage;
+  storage.area = patches.area;
+  for (std::uint32_t p = 0; p < n; ++p) storage.patch.push_back(p);
+  storage.matrix_count = 1;
+  const auto positions = static_cast<std::uint32_t>(HierarchicalFormat::position_count(n));
+  storage.blocks.push_back({.row_count = positions,
+                            .column_count = positions,
+                            .kind = TransferBlock::Kind::kLowRank,
+                            .row_rank = 1,
+                            .column_rank = 1});
+  std::vector<float> values(v);
+  values.resize(positions, 0.0F);
+  values.push_back(1);
+  values.resize(values.size() + HierarchicalFormat::kPadding, 0.0F);
+  storage.values_f32 = SharedArray(std::move(values));
+  return HierarchicalOperator(std::move(storage));
+}
+
+TEST(MatrixCompression, BlocksOfLowRankOnTheDiagonalAreCompressedAgain) {
+  const PatchTable& patches = room().patches;
+  std::vector<float> v;
+  for (const float area : patches.area) v.push_back(std::sqrt(area));
+  const HierarchicalOperator whole = one_block(v, patches);
+  const HierarchicalMatrix matrix(whole.storage());
+  const auto training = test::unshadowed_lights(patches, 8, 1, 2.2, 0.7);
+  const HierarchicalOperator again(compress_matrix(matrix, patches, training, kMultiplier));
+  for (const std::vector<Float3>& light : test::unshadowed_lights(patches, 4, 2, 2.2, 0.7)) {
+    EXPECT_LT(relative_difference(product(again, light), product(whole, light), patches.area),
+              1e-3);
+  }
 }
 
 }  // namespace

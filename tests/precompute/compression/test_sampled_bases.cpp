@@ -11,6 +11,7 @@
 
 #include "precompute/compression/coupling_solver.h"
 #include "precompute/compression/matrix_compression.h"
+#include "precompute/inverse/patch_groups.h"
 #include "precompute/inverse/solved_matrix.h"
 #include "tests/support/exchange_samples.h"
 #include "tests/support/solved_room.h"
@@ -56,7 +57,8 @@ struct Sampled {
   explicit Sampled(double tolerance, const PatchRoles& with = {}, const Room& of_room = room(),
                    std::uint32_t cell_size = kBasisCell)
       : of(of_room),
-        matrix(of.solved, of.solved.estimated_energies(with), with),
+        matrix(of.solved, of.solved.estimated_energies(with), with,
+               group_patches(of.solved.form_factors())),
         frame(compression_frame(matrix, of.patches, of.training)),
         cells(clusters_up_to(frame.tree, cell_size)),
         bases(sample_bases(of.solved, frame, cells, tolerance)) {}
@@ -234,6 +236,44 @@ TEST(SampledBases, RoomsWithoutADoorShareNearlyNothing) {
   const double error = error_of(sampled);
   RecordProperty("error", std::to_string(error));
   EXPECT_LT(error, 1.3 * 0.003);
+}
+
+/// The patches of the cells of each group.
+std::vector<std::vector<std::uint32_t>> patches_of_groups(const SharedBases& bases) {
+  std::vector<std::vector<std::uint32_t>> patches(1 + std::ranges::max(bases.group));
+  for (std::size_t c = 0; c < bases.cell_count(); ++c) {
+    std::vector<std::uint32_t>& own = patches[bases.group[c]];
+    own.insert(own.end(), bases.patches[c].begin(), bases.patches[c].end());
+  }
+  return patches;
+}
+
+TEST(SampledBases, EntriesBetweenGroupsAreProducts) {
+  Sampled sampled(0.02, {}, two_rooms(true), kSmallCell);
+  sampled.solve();
+  const auto groups = patches_of_groups(sampled.bases);
+  // Neighbours along the order of patches, some of which see the other room.
+  std::size_t found = 0, left = 0;
+  for (std::size_t begin = 0; begin + 160 <= groups[0].size(); begin += 80) {
+    const auto rows = std::span(groups[0]).subspan(begin, 160);
+    for (std::size_t other = 0; other + 128 <= groups[1].size(); other += 64) {
+      const auto columns = std::span(groups[1]).subspan(other, 128);
+      const auto factors = sampled.matrix.factors(rows, columns);
+      Eigen::MatrixXf entries(rows.size(), columns.size());
+      (factors ? found : left) += 1;
+      for (std::uint32_t m = 0; factors && m < sampled.matrix.matrix_count(); ++m) {
+        sampled.matrix.entries(m, rows, columns, entries);
+        const Eigen::MatrixXf product = (*factors)[m].rows * (*factors)[m].columns.transpose();
+        EXPECT_LE((product - entries).norm(), 1e-4F * entries.norm());
+        EXPECT_LE((*factors)[m].rows.cols(), 128 / 4 + 128 / 8);
+      }
+    }
+  }
+  EXPECT_GT(found, 5U);
+  EXPECT_GT(left, 5U);
+  EXPECT_FALSE(
+      sampled.matrix.factors(std::span(groups[0]).first(50), std::span(groups[0]).last(50)))
+      << "of one group";
 }
 
 TEST(SampledBases, EveryDirectionIsFarWhereNothingMayBeLost) {

@@ -30,7 +30,7 @@ class CorrectedSolverOfRoom : public testing::Test {
   CorrectedSolverOfRoom() : model_(make_patch_model(scene(), {.patch_count = 400})) {
     links_ = LinkBuilder(model_, test::make_tracer(model_), {}).build(kLinkEpsilon).form_factors;
     form_factors_ =
-        compress_form_factors(links_, patches(), fitting_lights(1), {kFormFactorTolerance});
+        compress_form_factors(links_, patches(), {}, fitting_lights(1), {kFormFactorTolerance});
     solved_.emplace(*form_factors_, patches(), kSolveResidual);
   }
 

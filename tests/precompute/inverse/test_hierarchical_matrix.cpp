@@ -104,6 +104,32 @@ TEST_P(HierarchicalMatrixOf, SameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(one, four);
 }
 
+TEST_P(HierarchicalMatrixOf, FactorsAreThoseOfItsEntriesWhereBlocksAreOfLowRank) {
+  std::vector<std::uint32_t> order(transfer.storage().patch);  // by position
+  const std::span patches(order);
+  int found = 0, left = 0;
+  for (std::size_t row = 0; row + 64 <= kPatchCount; row += 16) {
+    for (std::size_t column = 0; column + 64 <= row; column += 16) {
+      const auto rows = patches.subspan(row, 64), columns = patches.subspan(column, 48);
+      const auto factors = matrix.factors(rows, columns);
+      (factors ? found : left) += 1;
+      for (std::uint32_t m = 0; factors && m < matrix.matrix_count(); ++m) {
+        for (const auto& [a, b] : {std::pair(rows, columns), std::pair(columns, rows)}) {
+          Eigen::MatrixXf entries(a.size(), b.size());
+          matrix.entries(m, a, b, entries);
+          const auto of_both = matrix.factors(a, b);
+          ASSERT_TRUE(of_both);
+          EXPECT_LE((*of_both)[m].rows.cols(), 6);
+          const Eigen::MatrixXf product = (*of_both)[m].rows * (*of_both)[m].columns.transpose();
+          EXPECT_LE((product - entries).norm(), 1e-5F * entries.norm());
+        }
+      }
+    }
+  }
+  EXPECT_GT(found, 0);
+  EXPECT_GT(left, 0);
+}
+
 INSTANTIATE_TEST_SUITE_P(Kinds, HierarchicalMatrixOf,
                          testing::Values(Kind{Precision::kF32}, Kind{Precision::kF16},
                                          Kind{Precision::kQ8}, Kind{Precision::kF32, true},

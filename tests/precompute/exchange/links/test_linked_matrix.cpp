@@ -92,6 +92,22 @@ TEST(LinkedMatrix, EnergiesAreThoseOfItsColumns) {
   EXPECT_LT((energies - exact).norm(), 1e-5 * exact.norm());
 }
 
+TEST(LinkedMatrix, IsZeroBetweenListsWithoutLinks) {
+  const LinkedMatrix matrix(room().links(), room().patches());
+  const std::size_t n = room().patches().size();
+  int zero = 0, other = 0;
+  for (std::size_t begin = 0; begin + 8 <= n; begin += 4) {
+    const auto rows = some_patches(begin, 1), columns = some_patches(begin + 1, 1 + begin % 3);
+    Eigen::MatrixXf entries(rows.size(), columns.size());
+    matrix.entries(0, rows, columns, entries);
+    // An affine entry may be 0 by chance, but not in this room.
+    EXPECT_EQ(matrix.is_zero(rows, columns), (entries.array() == 0).all()) << begin;
+    (matrix.is_zero(rows, columns) ? zero : other) += 1;
+  }
+  EXPECT_GT(zero, 3);
+  EXPECT_GT(other, 3);
+}
+
 TEST(LinkedMatrix, IsCompressedToATolerance) {
   constexpr double kTolerance = 0.005;
   const std::size_t n = room().patches().size();
@@ -109,7 +125,7 @@ TEST(LinkedMatrix, IsCompressedToATolerance) {
   }
   const auto unseen = lights.end() - 16;
   const auto compressed = compress_form_factors(
-      room().links(), room().patches(),
+      room().links(), room().patches(), {},
       {{lights.begin(), lights.begin() + 32}, {lights.begin() + 32, unseen}}, {kTolerance});
   double error = 0;
   for (const auto& light : std::span(unseen, lights.end())) {
