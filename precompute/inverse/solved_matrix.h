@@ -19,7 +19,8 @@ namespace rebounce {
 /// the form factors, which are exact, and the rest between the bases of cells.
 class SolvedMatrix final : public SymmetricMatrix {
  public:
-  /// `solved` must outlive the object; `energies` [n] are those that it estimates with these roles.
+  /// `solved` must outlive the object; `energies` [n] are those that it estimates with these roles;
+  /// `group`: SymmetricMatrix::group.
   SolvedMatrix(const SolvedTransfer& solved, Eigen::VectorXd energies, PatchRoles roles,
                std::vector<std::uint8_t> group)
       : SymmetricMatrix(std::move(roles), std::move(group)),
