@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "precompute/base/entry_parts.h"
 #include "rebounce/scene_data.h"
 #include "transfer/exchange/exchange_matrix.h"
 #include "transfer/operator/dense_operator.h"
@@ -16,11 +17,6 @@ namespace rebounce {
 
 /// The most groups that the patches of a matrix have.
 inline constexpr std::size_t kMostPatchGroups = 64;
-
-/// Entries between two lists of patches, as the product rows columns^T of narrow matrices.
-struct EntryFactors {
-  Eigen::MatrixXf rows, columns;  ///< [rows][k], [columns][k]
-};
 
 /// What compression reads: a matrix M over the patches for each distinct channel, in its symmetric
 /// form A^1/2 M A^-1/2, where A holds the areas. Usable from any number of threads.
@@ -60,11 +56,20 @@ class SymmetricMatrix {
     return false;
   }
 
-  /// The entries of each of the matrices as products, for lists between which they are known as
-  /// such.
-  virtual std::optional<std::vector<EntryFactors>> factors(
-      std::span<const std::uint32_t> /*rows*/, std::span<const std::uint32_t> /*columns*/) const {
+  /// Whether `parts` ever gives any.
+  virtual bool has_parts() const { return false; }
+
+  /// The entries of all matrices as sums of parts, whose rows and columns are indices in the two
+  /// lists; nothing where they are not few.
+  virtual std::optional<JointEntryParts> parts(std::span<const std::uint32_t> /*rows*/,
+                                               std::span<const std::uint32_t> /*columns*/) const {
     return std::nullopt;
+  }
+
+  /// Whether parts of this many values are worth it in place of the entries of a block, of one
+  /// matrix.
+  static bool are_few(Eigen::Index value_count, std::size_t rows, std::size_t columns) {
+    return kEntriesOverValues * static_cast<std::size_t>(value_count) <= rows * columns;
   }
 
   /// The product with many vectors at once, x [n][k]. The bits do not depend on the number of
@@ -77,6 +82,8 @@ class SymmetricMatrix {
   virtual Eigen::VectorXd energies(std::span<const std::uint32_t> order) const;
 
  private:
+  static constexpr std::size_t kEntriesOverValues = 2;  // lab/180
+
   PatchRoles roles_;
   std::vector<std::uint8_t> group_;
 };

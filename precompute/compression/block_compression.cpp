@@ -61,11 +61,11 @@ struct Shape {
         columns(block.columns()),
         matrix_count(block.matrix_count),
         on_diagonal(block.on_diagonal) {}
-  explicit Shape(const FactoredBlock& block)
+  explicit Shape(const StructuredBlock& block)
       : rows(block.rows()),
         columns(block.columns()),
         matrix_count(block.matrix_count()),
-        on_diagonal(false) {}
+        on_diagonal(block.on_diagonal()) {}
 };
 
 enum class Digits { kSingle, kDouble };
@@ -76,39 +76,19 @@ MatrixXd times(const WideBlock& block, const MatrixXf& columns, Digits digits) {
   return MatrixXf(block.entries.cast<float>() * columns).cast<double>();
 }
 
-MatrixXd times(const FactoredBlock& block, const MatrixXf& columns, Digits /*digits*/) {
-  MatrixXd product = MatrixXd::Zero(block.rows(), columns.cols());
-  for (Index m = 0; m < block.matrix_count(); ++m) {
-    const MatrixXd of_matrix =
-        columns.middleRows(m * block.columns(), block.columns()).cast<double>();
-    const MatrixXd within = block.column_factor[m].transpose() * of_matrix;
-    product.noalias() += block.row_factor[m] * within;
-  }
-  return product;
-}
-
-/// The transpose of `rows` times the block.
-MatrixXd in_directions(const MatrixXd& rows, const WideBlock& block) {
-  return rows.transpose() * block.entries;
-}
-
-MatrixXd in_directions(const MatrixXd& rows, const FactoredBlock& block) {
-  MatrixXd product(rows.cols(), block.matrix_count() * block.columns());
-  for (Index m = 0; m < block.matrix_count(); ++m) {
-    const MatrixXd within = rows.transpose() * block.row_factor[m];
-    product.middleCols(m * block.columns(), block.columns()).noalias() =
-        within * block.column_factor[m].transpose();
-  }
-  return product;
-}
-
 /// The leading left singular vectors of a block.
 class RowSpectrum : public Spectrum {
  public:
   /// No more than `largest_rank` are wanted. A direction is worth having for the energy `price`.
   RowSpectrum(const WideBlock& block, Index largest_rank, double price, std::uint64_t seed) {
     if (2 * (largest_rank + kOversampling) < block.rows()) {
-      sketch(block, block.entries.squaredNorm(), largest_rank, price, seed);
+      const double energy = block.entries.squaredNorm();
+      const Digits digits = price > kSinglePrecision * energy ? Digits::kSingle : Digits::kDouble;
+      const MatrixXd range =
+          range_of(times(block, signs(Shape(block), largest_rank, seed), digits));
+      MatrixXd block_in_range = range.transpose() * block.entries;
+      const double lost = std::max(0.0, energy - block_in_range.squaredNorm());
+      find_directions(range, std::move(block_in_range), lost);
     } else {
       in_range_ = block.entries;
       static_cast<Spectrum&>(*this) = gram_spectrum(in_range_);
@@ -116,8 +96,10 @@ class RowSpectrum : public Spectrum {
     }
   }
 
-  RowSpectrum(const FactoredBlock& block, Index largest_rank, double price, std::uint64_t seed) {
-    sketch(block, block.squared_norm(), largest_rank, price, seed);
+  RowSpectrum(const StructuredBlock& block, Index largest_rank, double /*price*/,
+              std::uint64_t seed) {
+    const MatrixXd range = range_of(block.times(signs(Shape(block), largest_rank, seed)));
+    find_directions(range, block.in_directions(range), block.energy_beside(range));
   }
 
   /// The block in the first `rank` directions, [rank][matrices x columns].
@@ -126,19 +108,20 @@ class RowSpectrum : public Spectrum {
   }
 
  private:
-  template <typename Block>
-  void sketch(const Block& block, double energy, Index largest_rank, double price,
-              std::uint64_t seed) {
-    const Shape shape(block);
-    const MatrixXf signs =
-        random_signs(shape.matrix_count * shape.columns, largest_rank + kOversampling, seed);
-    const bool single = price > kSinglePrecision * energy;
-    const MatrixXd sample = times(block, signs, single ? Digits::kSingle : Digits::kDouble);
-    const MatrixXd range = Eigen::HouseholderQR<MatrixXd>(sample).householderQ() *
-                           MatrixXd::Identity(sample.rows(), sample.cols());
-    in_range_ = in_directions(range, block);
+  static MatrixXf signs(const Shape& shape, Index largest_rank, std::uint64_t seed) {
+    return random_signs(shape.matrix_count * shape.columns, largest_rank + kOversampling, seed);
+  }
+
+  /// An orthonormal basis of the columns of a sample.
+  static MatrixXd range_of(const MatrixXd& sample) {
+    return Eigen::HouseholderQR<MatrixXd>(sample).householderQ() *
+           MatrixXd::Identity(sample.rows(), sample.cols());
+  }
+
+  /// The directions in a range, beside which the block has the energy `lost`.
+  void find_directions(const MatrixXd& range, MatrixXd block_in_range, double lost) {
+    in_range_ = std::move(block_in_range);
     static_cast<Spectrum&>(*this) = gram_spectrum(in_range_);
-    const double lost = std::max(0.0, energy - in_range_.squaredNorm());
     for (double& energy_missing : missing) energy_missing += lost;
     in_range_directions_ = std::move(directions);
     directions = range * in_range_directions_;
@@ -286,22 +269,12 @@ BlockAttempt compress_any(const Block& block, const CompressionCost& cost, doubl
 
 }  // namespace
 
-double FactoredBlock::squared_norm() const {
-  double sum = 0;
-  for (std::size_t m = 0; m < row_factor.size(); ++m) {
-    const MatrixXd of_rows = row_factor[m].transpose() * row_factor[m];
-    const MatrixXd of_columns = column_factor[m].transpose() * column_factor[m];
-    sum += of_rows.cwiseProduct(of_columns).sum();
-  }
-  return sum;
-}
-
 BlockAttempt compress_block(const WideBlock& block, const CompressionCost& cost, double limit,
                             Index largest_rank, std::uint64_t seed) {
   return compress_any(block, cost, limit, largest_rank, seed);
 }
 
-BlockAttempt compress_block(const FactoredBlock& block, const CompressionCost& cost, double limit,
+BlockAttempt compress_block(const StructuredBlock& block, const CompressionCost& cost, double limit,
                             Index largest_rank, std::uint64_t seed) {
   return compress_any(block, cost, limit, largest_rank, seed);
 }

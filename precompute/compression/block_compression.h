@@ -5,6 +5,8 @@
 #include <optional>
 #include <vector>
 
+#include "precompute/compression/structured_block.h"
+
 namespace rebounce {
 
 /// One block of each distinct channel side by side, [rows][matrices x columns].
@@ -16,17 +18,6 @@ struct WideBlock {
   Eigen::Index rows() const { return entries.rows(); }
   Eigen::Index columns() const { return entries.cols() / matrix_count; }
   auto matrix(Eigen::Index m) const { return entries.middleCols(m * columns(), columns()); }
-};
-
-/// The same with entries that are products of narrow matrices, off the diagonal.
-struct FactoredBlock {
-  /// Of each matrix: B_m = row_factor[m] column_factor[m]^T, [rows][k] and [columns][k].
-  std::vector<Eigen::MatrixXd> row_factor, column_factor;
-
-  Eigen::Index rows() const { return row_factor.front().rows(); }
-  Eigen::Index columns() const { return column_factor.front().rows(); }
-  Eigen::Index matrix_count() const { return static_cast<Eigen::Index>(row_factor.size()); }
-  double squared_norm() const;
 };
 
 /// B_m ~ row_basis coupling_m column_basis^T. On the diagonal the column basis is empty: it equals
@@ -99,8 +90,9 @@ struct BlockAttempt {
 BlockAttempt compress_block(const WideBlock& block, const CompressionCost& cost, double limit,
                             Eigen::Index largest_rank, std::uint64_t seed);
 
-/// The same from a sketch alone, for blocks whose sides are several times `largest_rank`.
-BlockAttempt compress_block(const FactoredBlock& block, const CompressionCost& cost, double limit,
+/// The same from a sketch alone, for blocks whose sides are several times `largest_rank`. The error
+/// is estimated.
+BlockAttempt compress_block(const StructuredBlock& block, const CompressionCost& cost, double limit,
                             Eigen::Index largest_rank, std::uint64_t seed);
 
 }  // namespace rebounce

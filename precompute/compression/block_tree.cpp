@@ -2,6 +2,7 @@
 
 #include <Eigen/QR>
 #include <algorithm>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -19,6 +20,9 @@ using Eigen::Index;
 
 // The largest and the smallest side of a piece of the matrix that is read and compressed at a time.
 constexpr std::uint32_t kLargestPiece = 2048, kSmallestPiece = 512;
+
+// The largest side of a block that is read where the matrix is known as a sum of parts.
+constexpr std::uint32_t kLargestRead = 512;  // lab/180
 
 // A block is smooth if its best ranks stay below this fraction of its sides. Splitting it would
 // only store the same few functions several times (lab/052).
@@ -50,31 +54,52 @@ class PieceCompressor {
  public:
   PieceCompressor(const SymmetricMatrix& matrix, const ClusterTree& tree,
                   const std::vector<ClusterWeight>& weights, const WantedBlocks& wanted,
-                  const PartSizes& sizes, double multiplier, const BlockPiece& piece,
-                  ParallelProgress& loop)
+                  const PartSizes& sizes, double multiplier, ParallelProgress& loop)
       : loop_(loop),
         tree_(tree),
         weights_(weights),
         wanted_(wanted),
         sizes_(sizes),
         multiplier_(multiplier),
-        row_(piece.row),
-        column_(piece.column),
-        row_begin_(tree.clusters[piece.row].begin),
-        column_begin_(tree.clusters[piece.column].begin),
         matrix_(matrix) {}
 
-  BlockPart compress() {
-    if (loop_.look() || !wanted_.wanted(row_, column_)) return {};
-    if (std::optional<BlockPart> part = compress_factors()) return std::move(*part);
-    gather();
-    return compress(row_, column_);
+  /// A block of the piece, which may be all of it. Where the matrix is known as a sum of parts, the
+  /// entries of large blocks are not read.
+  BlockPart compress(std::uint32_t row, std::uint32_t column) {
+    if (loop_.look() || !wanted_.wanted(row, column)) return {};
+    const auto rows = patches_of(tree_, tree_.clusters[row]),
+               columns = patches_of(tree_, tree_.clusters[column]);
+    if (matrix_.is_zero(rows, columns)) {
+      return zero_part(place_of(row, column), multiplier_ * sizes_.block);
+    }
+    if (!matrix_.has_parts() || !is_large(row, column)) {
+      gather(row, column);
+      return compress_entries(row, column);
+    }
+    const std::optional<StructuredBlock> block = structured_block(row, column);
+    const double energy = block ? block->energy() : std::numeric_limits<double>::infinity();
+    if (block) {
+      BlockAttempt attempt;
+      std::optional<BlockPart> part = compress_smooth(*block, energy, {row, column}, attempt);
+      if (part) return std::move(*part);
+    }
+    BlockPart best = compress_children(
+        row, column, [&](std::uint32_t r, std::uint32_t c) { return compress(r, c); });
+    const double zero_cost = cost_of(row, column).total(energy, sizes_.block);
+    return zero_cost <= best.cost ? zero_part(place_of(row, column), zero_cost) : best;
   }
 
  private:
-  void gather() {
-    const Cluster &row = tree_.clusters[row_], &column = tree_.clusters[column_];
+  bool is_large(std::uint32_t row, std::uint32_t column) const {
+    return std::max(tree_.clusters[row].count, tree_.clusters[column].count) > kLargestRead &&
+           !are_leaves(row, column);
+  }
+
+  void gather(std::uint32_t of_row, std::uint32_t of_column) {
+    const Cluster &row = tree_.clusters[of_row], &column = tree_.clusters[of_column];
     const auto rows = patches_of(tree_, row), columns = patches_of(tree_, column);
+    row_begin_ = row.begin;
+    column_begin_ = column.begin;
     matrices_ = matrix_.all_entries(rows, columns);
     for (Eigen::MatrixXf& entries : matrices_) {
       wanted_.clear_unwanted(rows, columns, entries);
@@ -86,31 +111,19 @@ class PieceCompressor {
     }
   }
 
-  /// The piece as one block, if that is all it needs and its entries are known without being read.
-  std::optional<BlockPart> compress_factors() const {
-    const Cluster &row = tree_.clusters[row_], &column = tree_.clusters[column_];
-    const auto rows = patches_of(tree_, row), columns = patches_of(tree_, column);
-    if (matrix_.is_zero(rows, columns)) {
-      return zero_part(place_of(row_, column_), multiplier_ * sizes_.block);
-    }
-    if (row_ == column_ || wanted_.is_mixed(row_) || wanted_.is_mixed(column_)) return std::nullopt;
-    const auto factors = matrix_.factors(rows, columns);
-    if (!factors) return std::nullopt;
-    const auto weighted = [](const Eigen::MatrixXf& factor, Index positions,
-                             const ClusterWeight* weight) {
-      Eigen::MatrixXd padded = Eigen::MatrixXd::Zero(positions, factor.cols());
-      padded.topRows(factor.rows()) = factor.cast<double>();
-      if (weight != nullptr) weight->weigh_rows(padded);
-      return padded;
-    };
-    FactoredBlock block;
-    for (const EntryFactors& of_matrix : *factors) {
-      block.row_factor.push_back(weighted(of_matrix.rows, row.count, weight_of(row_, column_)));
-      block.column_factor.push_back(
-          weighted(of_matrix.columns, column.count, weight_of(column_, row_)));
-    }
-    BlockAttempt attempt;
-    return compress_smooth(block, block.squared_norm(), {row_, column_}, attempt);
+  /// A weighted block that is not read.
+  std::optional<StructuredBlock> structured_block(std::uint32_t row, std::uint32_t column) const {
+    if (wanted_.is_mixed(row) || wanted_.is_mixed(column)) return std::nullopt;
+    const Cluster &rows = tree_.clusters[row], &columns = tree_.clusters[column];
+    auto parts = matrix_.parts(patches_of(tree_, rows), patches_of(tree_, columns));
+    if (!parts) return std::nullopt;
+    return StructuredBlock(std::move(*parts),
+                           {.rows = rows.count,
+                            .columns = columns.count,
+                            .row_weight = weight_of(row, column),
+                            .column_weight = weight_of(column, row),
+                            .on_diagonal = row == column},
+                           seed_of(place_of(row, column)));
   }
 
   Index matrix_count() const { return static_cast<Index>(matrices_.size()); }
@@ -195,9 +208,14 @@ class PieceCompressor {
     return tree_.clusters[row].is_leaf() && tree_.clusters[column].is_leaf();
   }
 
-  BlockPart compress(std::uint32_t row, std::uint32_t column) const {
+  /// A block whose entries are read.
+  BlockPart compress_entries(std::uint32_t row, std::uint32_t column) const {
     if (loop_.look() || !wanted_.wanted(row, column)) return {};
-    if (wanted_.is_mixed(row) || wanted_.is_mixed(column)) return compress_children(row, column);
+    const auto children = [&] {
+      return compress_children(
+          row, column, [&](std::uint32_t r, std::uint32_t c) { return compress_entries(r, c); });
+    };
+    if (wanted_.is_mixed(row) || wanted_.is_mixed(column)) return children();
     const TransferBlock place = place_of(row, column);
     const double overhead = multiplier_ * sizes_.block;
     if (is_zero(place)) return zero_part(place, overhead);
@@ -208,7 +226,7 @@ class PieceCompressor {
     if (std::optional<BlockPart> part = compress_smooth(block, energy, {row, column}, attempt)) {
       return std::move(*part);
     }
-    BlockPart best = are_leaves(row, column) ? dense_part(place) : compress_children(row, column);
+    BlockPart best = are_leaves(row, column) ? dense_part(place) : children();
     const double zero_cost = cost.total(energy, sizes_.block);
     if (zero_cost <= best.cost) best = zero_part(place, zero_cost);
     const double limit = best.cost - overhead;
@@ -220,7 +238,10 @@ class PieceCompressor {
     return attempt.block ? low_rank_part(place, *attempt.block, row, column, cost) : best;
   }
 
-  BlockPart compress_children(std::uint32_t row, std::uint32_t column) const {
+  /// The blocks below a block, each made by `compress_child`.
+  template <typename CompressChild>
+  BlockPart compress_children(std::uint32_t row, std::uint32_t column,
+                              const CompressChild& compress_child) const {
     BlockPart part;
     const auto child = [&](std::uint32_t cluster, std::uint32_t k) {
       const Cluster& c = tree_.clusters[cluster];
@@ -231,7 +252,7 @@ class PieceCompressor {
     for (std::uint32_t r = 0; r < row_children; ++r) {
       for (std::uint32_t c = 0; c < column_children; ++c) {
         if (row == column && c > r) continue;
-        part.append(compress(child(row, r), child(column, c)));
+        part.append(compress_child(child(row, r), child(column, c)));
       }
     }
     return part;
@@ -297,9 +318,9 @@ class PieceCompressor {
   const WantedBlocks& wanted_;
   const PartSizes& sizes_;
   double multiplier_;
-  std::uint32_t row_, column_, row_begin_, column_begin_;
   const SymmetricMatrix& matrix_;
-  std::vector<Eigen::MatrixXf> matrices_;
+  std::uint32_t row_begin_ = 0, column_begin_ = 0;  ///< of the entries
+  std::vector<Eigen::MatrixXf> matrices_;           ///< the entries that are read
 };
 
 void add_pieces(const ClusterTree& tree, BlockPiece piece, std::uint32_t largest,
@@ -392,9 +413,8 @@ BlockPart BlockTreeCompressor::compress(std::span<const BlockPiece> pieces, doub
   parallel_loop(pieces.size(), [&](std::size_t k) {
     if (loop.stopped() || !ranks.makes(k)) return;
     if (wants(pieces[k])) {
-      parts[k] =
-          PieceCompressor(matrix_, tree_, weights_, wanted_, sizes_, multiplier, pieces[k], loop)
-              .compress();
+      parts[k] = PieceCompressor(matrix_, tree_, weights_, wanted_, sizes_, multiplier, loop)
+                     .compress(pieces[k].row, pieces[k].column);
     }
     loop.advance();
   });

@@ -28,18 +28,29 @@ std::vector<Eigen::MatrixXf> EquilibratedMatrix::all_entries(
   return all;
 }
 
-std::optional<std::vector<EntryFactors>> EquilibratedMatrix::factors(
+std::optional<JointEntryParts> EquilibratedMatrix::parts(
     std::span<const std::uint32_t> rows, std::span<const std::uint32_t> columns) const {
-  std::optional<std::vector<EntryFactors>> all = matrix_.factors(rows, columns);
-  const auto scale = [&](std::span<const std::uint32_t> patches, Eigen::MatrixXf& factor) {
-    for (std::size_t k = 0; k < patches.size(); ++k) {
-      factor.row(static_cast<Eigen::Index>(k)) *= inverse_[patches[k]];
+  std::optional<JointEntryParts> all = matrix_.parts(rows, columns);
+  if (!all) return all;
+  const auto scales = [&](std::span<const std::uint32_t> patches,
+                          const std::vector<std::uint32_t>& indices) {
+    Eigen::VectorXf scale(static_cast<Eigen::Index>(indices.size()));
+    for (Eigen::Index k = 0; k < scale.size(); ++k) scale[k] = inverse_[patches[indices[k]]];
+    return scale;
+  };
+  const auto equilibrate = [&](EntryPart& part) {
+    const Eigen::VectorXf of_rows = scales(rows, part.rows),
+                          of_columns = scales(columns, part.columns);
+    part.left = of_rows.asDiagonal() * part.left;
+    if (part.is_product()) {
+      part.right = of_columns.asDiagonal() * part.right;
+    } else {
+      part.left = part.left * of_columns.asDiagonal();
     }
   };
-  if (!all) return all;
-  for (EntryFactors& of_matrix : *all) {
-    scale(rows, of_matrix.rows);
-    scale(columns, of_matrix.columns);
+  for (EntryPart& part : all->common) equilibrate(part);
+  for (EntryParts& of_matrix : all->own) {
+    for (EntryPart& part : of_matrix) equilibrate(part);
   }
   return all;
 }

@@ -33,8 +33,9 @@ class EquilibratedMatrix final : public SymmetricMatrix {
                std::span<const std::uint32_t> columns) const override {
     return matrix_.is_zero(rows, columns);
   }
-  std::optional<std::vector<EntryFactors>> factors(
-      std::span<const std::uint32_t> rows, std::span<const std::uint32_t> columns) const override;
+  bool has_parts() const override { return matrix_.has_parts(); }
+  std::optional<JointEntryParts> parts(std::span<const std::uint32_t> rows,
+                                       std::span<const std::uint32_t> columns) const override;
   Eigen::MatrixXf multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const override;
 
  private:

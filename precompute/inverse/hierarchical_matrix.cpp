@@ -20,9 +20,6 @@ constexpr std::uint32_t kStrip = 512;
 // Vectors that one thread multiplies with at a time.
 constexpr Index kBatchVectors = 32;
 
-// The least ratio of the sides of factors to their width: wider ones save little (lab/179).
-constexpr Index kSideOverRanks = 8;
-
 /// Computes to = matrix from, or to += matrix from with kAdd. matrix is [rows][columns], the
 /// vectors have `width` columns; all are row-major.
 enum class Write { kSet, kAdd };
@@ -256,47 +253,43 @@ MatrixXf HierarchicalMatrix::part_entries(std::uint32_t matrix, const Part& part
   return entries;
 }
 
-/// Whether a part of a dense block is 0 in all matrices.
-bool HierarchicalMatrix::is_dark(const Part& part) const {
-  for (std::uint32_t m = 0; m < matrix_count(); ++m) {
-    if (!part_entries(m, part).isZero(0)) return false;
+EntryPart HierarchicalMatrix::entry_part(std::uint32_t matrix, const Part& part) const {
+  const auto indices = [](std::span<const Place> places) {
+    std::vector<std::uint32_t> list;
+    for (const Place& place : places) list.push_back(place.index);
+    return list;
+  };
+  const TransferBlock& block = storage_.blocks[part.block];
+  EntryPart result{indices(part.rows), indices(part.columns), {}, {}};
+  const std::size_t of_product = (part.rows.size() + part.columns.size()) * block.row_rank;
+  if (block.kind == TransferBlock::Kind::kDense ||
+      of_product >= part.rows.size() * part.columns.size()) {
+    result.left = part_entries(matrix, part);
+    if (part.mirrored) result.left.transposeInPlace();
+  } else {
+    const auto [of_rows, of_columns] = part_factors(matrix, part);
+    result.left = of_rows.transpose();
+    result.right = of_columns.transpose();
+    if (part.mirrored) std::swap(result.left, result.right);
   }
-  return true;
+  if (part.mirrored) std::swap(result.rows, result.columns);
+  return result;
 }
 
-std::optional<std::vector<EntryFactors>> HierarchicalMatrix::factors(
+std::optional<JointEntryParts> HierarchicalMatrix::parts(
     std::span<const std::uint32_t> rows, std::span<const std::uint32_t> columns) const {
   const Places at_rows(rows, position_), at_columns(columns, position_);
-  std::vector<Part> parts;
-  Index width = 0;
+  JointEntryParts all;
+  all.own.resize(matrix_count());
+  Index values = 0;  // of all matrices
   for (const Part& part : parts_between(at_rows, at_columns)) {
-    const TransferBlock& block = storage_.blocks[part.block];
-    if (block.kind == TransferBlock::Kind::kDense) {
-      if (!is_dark(part)) return std::nullopt;
-      continue;
+    for (std::uint32_t m = 0; m < matrix_count(); ++m) {
+      EntryPart entries = entry_part(m, part);
+      if (entries.left.isZero(0)) continue;
+      values += entries.value_count();
+      all.own[m].push_back(std::move(entries));
     }
-    parts.push_back(part);
-    width += block.row_rank;
-  }
-  if (width * kSideOverRanks > static_cast<Index>(std::min(rows.size(), columns.size()))) {
-    return std::nullopt;
-  }
-  std::vector<EntryFactors> all;
-  for (std::uint32_t m = 0; m < matrix_count(); ++m) {
-    all.push_back({MatrixXf::Zero(rows.size(), width), MatrixXf::Zero(columns.size(), width)});
-    Index first = 0;
-    const auto place = [&](const Vectors& from, std::span<const Place> places, MatrixXf& to) {
-      for (std::size_t k = 0; k < places.size(); ++k) {
-        to.row(places[k].index).segment(first, from.rows()) =
-            from.col(static_cast<Index>(k)).transpose();
-      }
-    };
-    for (const Part& part : parts) {
-      const auto [of_rows, of_columns] = part_factors(m, part);
-      place(of_rows, part.rows, part.mirrored ? all.back().columns : all.back().rows);
-      place(of_columns, part.columns, part.mirrored ? all.back().rows : all.back().columns);
-      first += of_rows.rows();
-    }
+    if (!are_few(values / matrix_count(), rows.size(), columns.size())) return std::nullopt;
   }
   return all;
 }

@@ -30,9 +30,10 @@ class HierarchicalMatrix final : public SymmetricMatrix {
   void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
                std::span<const std::uint32_t> columns,
                Eigen::Ref<Eigen::MatrixXf> entries) const override;
-  /// Those of blocks of low rank, where there are few.
-  std::optional<std::vector<EntryFactors>> factors(
-      std::span<const std::uint32_t> rows, std::span<const std::uint32_t> columns) const override;
+  bool has_parts() const override { return true; }
+  /// A part for each block, as it is stored.
+  std::optional<JointEntryParts> parts(std::span<const std::uint32_t> rows,
+                                       std::span<const std::uint32_t> columns) const override;
   Eigen::MatrixXf multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const override;
 
   Eigen::Index position_count() const;
@@ -78,7 +79,7 @@ class HierarchicalMatrix final : public SymmetricMatrix {
   std::vector<Part> parts_between(const Places& rows, const Places& columns) const;
   std::pair<Vectors, Vectors> part_factors(std::uint32_t matrix, const Part& part) const;
   Eigen::MatrixXf part_entries(std::uint32_t matrix, const Part& part) const;
-  bool is_dark(const Part& part) const;
+  EntryPart entry_part(std::uint32_t matrix, const Part& part) const;
   void find_reached(Workspace& workspace) const;
   void multiply_blocks(std::uint32_t matrix, const Vectors& x, Vectors& y,
                        Workspace& workspace) const;

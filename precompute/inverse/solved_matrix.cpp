@@ -2,18 +2,13 @@
 
 #include <algorithm>
 #include <bitset>
+#include <numeric>
+#include <utility>
 
 namespace rebounce {
 
 using Eigen::Index;
 using Eigen::MatrixXf;
-
-namespace {
-
-// The least ratio of the sides of factors to their width: wider ones save nothing (lab/179).
-constexpr Index kSideOverVectors = 4;
-
-}  // namespace
 
 void SolvedMatrix::set_entries(SharedBases bases, std::vector<PackedCouplings> couplings) {
   bases_ = std::move(bases);
@@ -109,60 +104,58 @@ bool SolvedMatrix::are_apart(std::span<const std::uint32_t> rows,
   return std::ranges::none_of(columns, [&](std::uint32_t p) { return of_rows[group_of(p)]; });
 }
 
-std::optional<EntryFactors> SolvedMatrix::far_factors(
-    std::uint32_t matrix, std::span<const std::uint32_t> rows,
-    std::span<const std::uint32_t> columns) const {
-  const std::vector<Run> row_runs = runs_of(matrix, rows, Which::kFar),
-                         column_runs = runs_of(matrix, columns, Which::kFar);
+EntryParts SolvedMatrix::later_parts(std::uint32_t matrix, std::span<const Run> left,
+                                     std::span<const Run> right) const {
+  const auto indices = [](Index begin, Index count) {
+    std::vector<std::uint32_t> list(static_cast<std::size_t>(count));
+    std::iota(list.begin(), list.end(), static_cast<std::uint32_t>(begin));
+    return list;
+  };
+  const Index right_count = right.empty() ? 0 : right.back().begin + right.back().vectors.rows();
+  EntryParts parts;
+  for (const Run& run : left) {
+    EntryPart part{indices(run.begin, run.vectors.rows()), indices(0, right_count), run.vectors,
+                   MatrixXf::Zero(right_count, run.vectors.cols())};
+    for (const Run& other : right) {
+      const MatrixXf between = coupling(matrix, run.cell, other.cell);
+      part.right.block(other.begin, 0, other.vectors.rows(), between.rows()).noalias() =
+          other.vectors.leftCols(between.cols()) * between.transpose();
+    }
+    if (part.is_product()) parts.push_back(std::move(part));
+  }
+  return parts;
+}
+
+EntryParts SolvedMatrix::later_parts(std::uint32_t matrix, std::span<const std::uint32_t> rows,
+                                     std::span<const std::uint32_t> columns) const {
+  const Which which = are_apart(rows, columns) ? Which::kFar : Which::kAll;
+  const std::vector<Run> of_rows = runs_of(matrix, rows, which),
+                         of_columns = runs_of(matrix, columns, which);
   const auto vector_count = [](const std::vector<Run>& runs) {
     return runs.empty() ? 0 : runs.back().first + runs.back().vectors.cols();
   };
-  // The product is as narrow as the side with fewer vectors.
-  const Index of_rows = vector_count(row_runs), of_columns = vector_count(column_runs),
-              width = std::min(of_rows, of_columns);
-  const auto least_side = static_cast<Index>(std::min(rows.size(), columns.size()));
-  if (kSideOverVectors * width > least_side) return std::nullopt;
-  MatrixXf couplings(of_rows, of_columns);
-  for (const Run& column : column_runs) {
-    for (const Run& row : row_runs) {
-      couplings.block(row.first, column.first, row.vectors.cols(), column.vectors.cols()) =
-          coupling(matrix, row.cell, column.cell);
-    }
+  if (vector_count(of_rows) <= vector_count(of_columns)) {
+    return later_parts(matrix, of_rows, of_columns);
   }
-  const auto times = [](std::span<const std::uint32_t> patches, const std::vector<Run>& runs,
-                        const MatrixXf& factor) {
-    MatrixXf product(patches.size(), factor.cols());
-    for (const Run& run : runs) {
-      product.middleRows(run.begin, run.vectors.rows()).noalias() =
-          run.vectors * factor.middleRows(run.first, run.vectors.cols());
-    }
-    return product;
-  };
-  const MatrixXf identity = MatrixXf::Identity(width, width);
-  if (of_rows <= of_columns) {
-    return EntryFactors{times(rows, row_runs, identity),
-                        times(columns, column_runs, couplings.transpose())};
+  EntryParts parts = later_parts(matrix, of_columns, of_rows);
+  for (EntryPart& part : parts) {
+    std::swap(part.rows, part.columns);
+    std::swap(part.left, part.right);
   }
-  return EntryFactors{times(rows, row_runs, couplings), times(columns, column_runs, identity)};
+  return parts;
 }
 
-std::optional<std::vector<EntryFactors>> SolvedMatrix::factors(
-    std::span<const std::uint32_t> rows, std::span<const std::uint32_t> columns) const {
-  if (!are_apart(rows, columns)) return std::nullopt;
-  const auto first_bounce = solved_.form_factors().factors(rows, columns);
+std::optional<JointEntryParts> SolvedMatrix::parts(std::span<const std::uint32_t> rows,
+                                                   std::span<const std::uint32_t> columns) const {
+  std::optional<JointEntryParts> first_bounce = solved_.form_factors().parts(rows, columns);
   if (!first_bounce) return std::nullopt;
-  const auto joined = [](const MatrixXf& a, const MatrixXf& b) {
-    MatrixXf both(a.rows(), a.cols() + b.cols());
-    both.leftCols(a.cols()) = a;
-    both.rightCols(b.cols()) = b;
-    return both;
-  };
-  const EntryFactors& first = first_bounce->front();
-  std::vector<EntryFactors> all;
+  JointEntryParts all{std::move(first_bounce->own.front()), {}};
   for (std::uint32_t m = 0; m < matrix_count(); ++m) {
-    const std::optional<EntryFactors> later = far_factors(m, rows, columns);
-    if (!later) return std::nullopt;
-    all.push_back({joined(first.rows, later->rows), joined(first.columns, later->columns)});
+    Index values = 0;
+    for (const EntryPart& part : all.own.emplace_back(later_parts(m, rows, columns))) {
+      values += part.value_count();
+    }
+    if (!are_few(values, rows.size(), columns.size())) return std::nullopt;
   }
   return all;
 }

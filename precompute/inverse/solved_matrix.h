@@ -52,10 +52,10 @@ class SolvedMatrix final : public SymmetricMatrix {
   std::vector<Eigen::MatrixXf> all_entries(std::span<const std::uint32_t> rows,
                                            std::span<const std::uint32_t> columns) const override;
 
-  /// Those between groups of patches: couplings of their cells are between few vectors, and little
-  /// light goes from one to the other directly.
-  std::optional<std::vector<EntryFactors>> factors(
-      std::span<const std::uint32_t> rows, std::span<const std::uint32_t> columns) const override;
+  bool has_parts() const override { return true; }
+  /// Blocks of the form factors, and later bounces in the bases of cells.
+  std::optional<JointEntryParts> parts(std::span<const std::uint32_t> rows,
+                                       std::span<const std::uint32_t> columns) const override;
 
  private:
   /// Neighbours in a list of patches that lie in the same cell.
@@ -67,9 +67,11 @@ class SolvedMatrix final : public SymmetricMatrix {
   bool are_apart(std::span<const std::uint32_t> rows, std::span<const std::uint32_t> columns) const;
   /// The coupling between two cells, in any order; all 0 if it is not wanted.
   Eigen::MatrixXf coupling(std::uint32_t matrix, std::uint32_t row, std::uint32_t column) const;
-  /// Those of later bounces between groups; nothing where they would be wide.
-  std::optional<EntryFactors> far_factors(std::uint32_t matrix, std::span<const std::uint32_t> rows,
-                                          std::span<const std::uint32_t> columns) const;
+  /// Later bounces, a part for each run of `left`.
+  EntryParts later_parts(std::uint32_t matrix, std::span<const Run> left,
+                         std::span<const Run> right) const;
+  EntryParts later_parts(std::uint32_t matrix, std::span<const std::uint32_t> rows,
+                         std::span<const std::uint32_t> columns) const;
   void add_later_bounces(std::uint32_t matrix, const Run& row, const Run& column,
                          Eigen::Ref<Eigen::MatrixXf> entries) const;
   /// The same between two lists.

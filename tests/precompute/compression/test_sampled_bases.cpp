@@ -248,32 +248,49 @@ std::vector<std::vector<std::uint32_t>> patches_of_groups(const SharedBases& bas
   return patches;
 }
 
-TEST(SampledBases, EntriesBetweenGroupsAreProducts) {
+/// The greatest error of the parts of a matrix between two lists, as a fraction of its norm there;
+/// nothing where there are none.
+std::optional<float> error_of_parts(const SymmetricMatrix& matrix,
+                                    std::span<const std::uint32_t> rows,
+                                    std::span<const std::uint32_t> columns) {
+  const std::optional<JointEntryParts> parts = matrix.parts(rows, columns);
+  if (!parts) return std::nullopt;
+  float greatest = 0;
+  for (std::uint32_t m = 0; m < matrix.matrix_count(); ++m) {
+    Eigen::MatrixXf entries(rows.size(), columns.size());
+    matrix.entries(m, rows, columns, entries);
+    RowVectors sum = RowVectors::Zero(entries.rows(), entries.cols());
+    const RowVectors all = RowVectors::Identity(entries.cols(), entries.cols());
+    add_product(parts->common, all, sum);
+    add_product(parts->own[m], all, sum);
+    greatest = std::max(greatest, (sum - entries).norm() / entries.norm());
+  }
+  return greatest;
+}
+
+TEST(SampledBases, PartsAddUpToTheEntries) {
   Sampled sampled(0.02, {}, two_rooms(true), kSmallCell);
   sampled.solve();
   const auto groups = patches_of_groups(sampled.bases);
-  // Neighbours along the order of patches, some of which see the other room.
   std::size_t found = 0, left = 0;
-  for (std::size_t begin = 0; begin + 160 <= groups[0].size(); begin += 80) {
-    const auto rows = std::span(groups[0]).subspan(begin, 160);
-    for (std::size_t other = 0; other + 128 <= groups[1].size(); other += 64) {
-      const auto columns = std::span(groups[1]).subspan(other, 128);
-      const auto factors = sampled.matrix.factors(rows, columns);
-      Eigen::MatrixXf entries(rows.size(), columns.size());
-      (factors ? found : left) += 1;
-      for (std::uint32_t m = 0; factors && m < sampled.matrix.matrix_count(); ++m) {
-        sampled.matrix.entries(m, rows, columns, entries);
-        const Eigen::MatrixXf product = (*factors)[m].rows * (*factors)[m].columns.transpose();
-        EXPECT_LE((product - entries).norm(), 1e-4F * entries.norm());
-        EXPECT_LE((*factors)[m].rows.cols(), 128 / 4 + 128 / 8);
+  // Neighbours along the order of patches.
+  for (std::size_t begin = 0; begin + 320 <= groups[0].size(); begin += 80) {
+    const auto rows = std::span(groups[0]).subspan(begin, 320);
+    for (const std::size_t of : {0, 1}) {
+      for (std::size_t other = 0; other + 256 <= groups[of].size(); other += 64) {
+        if (of == 0 && other + 256 > begin && begin + 320 > other) continue;
+        const auto columns = std::span(groups[of]).subspan(other, 256);
+        const auto error = error_of_parts(sampled.matrix, rows, columns);
+        const auto mirrored = error_of_parts(sampled.matrix, columns, rows);
+        EXPECT_LE(error.value_or(0), 1e-4F);
+        EXPECT_LE(mirrored.value_or(0), 1e-4F);
+        (error ? found : left) += 1;
       }
     }
+    EXPECT_LE(error_of_parts(sampled.matrix, rows, rows).value_or(0), 1e-4F);
   }
   EXPECT_GT(found, 5U);
   EXPECT_GT(left, 5U);
-  EXPECT_FALSE(
-      sampled.matrix.factors(std::span(groups[0]).first(50), std::span(groups[0]).last(50)))
-      << "of one group";
 }
 
 TEST(SampledBases, EveryDirectionIsFarWhereNothingMayBeLost) {

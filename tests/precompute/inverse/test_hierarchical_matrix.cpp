@@ -104,27 +104,37 @@ TEST_P(HierarchicalMatrixOf, SameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(one, four);
 }
 
-TEST_P(HierarchicalMatrixOf, FactorsAreThoseOfItsEntriesWhereBlocksAreOfLowRank) {
+TEST_P(HierarchicalMatrixOf, PartsAddUpToItsEntries) {
   std::vector<std::uint32_t> order(transfer.storage().patch);  // by position
-  const std::span patches(order);
+  std::mt19937 random(3);
   int found = 0, left = 0;
-  for (std::size_t row = 0; row + 64 <= kPatchCount; row += 16) {
-    for (std::size_t column = 0; column + 64 <= row; column += 16) {
-      const auto rows = patches.subspan(row, 64), columns = patches.subspan(column, 48);
-      const auto factors = matrix.factors(rows, columns);
-      (factors ? found : left) += 1;
-      for (std::uint32_t m = 0; factors && m < matrix.matrix_count(); ++m) {
-        for (const auto& [a, b] : {std::pair(rows, columns), std::pair(columns, rows)}) {
-          Eigen::MatrixXf entries(a.size(), b.size());
-          matrix.entries(m, a, b, entries);
-          const auto of_both = matrix.factors(a, b);
-          ASSERT_TRUE(of_both);
-          EXPECT_LE((*of_both)[m].rows.cols(), 6);
-          const Eigen::MatrixXf product = (*of_both)[m].rows * (*of_both)[m].columns.transpose();
-          EXPECT_LE((product - entries).norm(), 1e-5F * entries.norm());
-        }
+  const auto check = [&](std::span<const std::uint32_t> rows,
+                         std::span<const std::uint32_t> columns) {
+    const auto parts = matrix.parts(rows, columns);
+    (parts ? found : left) += 1;
+    if (!parts) return;
+    for (std::uint32_t m = 0; m < matrix.matrix_count(); ++m) {
+      Eigen::MatrixXf entries(rows.size(), columns.size());
+      matrix.entries(m, rows, columns, entries);
+      const RowVectors x = RowVectors::Random(entries.cols(), 3),
+                       z = RowVectors::Random(entries.rows(), 3);
+      RowVectors y = RowVectors::Zero(entries.rows(), 3), w = RowVectors::Zero(entries.cols(), 3);
+      add_product(parts->own[m], x, y);
+      add_transposed_product(parts->own[m], z, w);
+      EXPECT_LE((y - entries * x).norm(), 1e-5F * (entries * x).norm());
+      EXPECT_LE((w - entries.transpose() * z).norm(), 1e-5F * (entries.transpose() * z).norm());
+    }
+  };
+  for (const bool shuffled : {false, true}) {
+    if (shuffled) std::ranges::shuffle(order, random);
+    const std::span patches(order);
+    for (std::size_t row = 0; row + 64 <= kPatchCount; row += 16) {
+      for (std::size_t column = 0; column + 64 <= row; column += 16) {
+        check(patches.subspan(row, 64), patches.subspan(column, 48));
+        check(patches.subspan(column, 48), patches.subspan(row, 64));
       }
     }
+    check(patches, patches);
   }
   EXPECT_GT(found, 0);
   EXPECT_GT(left, 0);
