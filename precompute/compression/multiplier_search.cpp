@@ -53,7 +53,7 @@ void MultiplierSearch::report(double error, double size) {
                                               : outside(trials_.back());
   multiplier_ = std::exp(next.multiplier);
   const bool narrow = bracketed && high->multiplier - (high - 1)->multiplier < kNarrow;
-  done_ = narrow || next.size > smallest_ + std::log1p(-kLeastSaving);
+  done_ = narrow || next.size > smallest_ + std::log1p(-least_saving_);
 }
 
 bool MultiplierSearch::contradicts(const Trial& trial, const Trial& old) {

@@ -21,11 +21,9 @@ class MultiplierSearch {
     double aim = 0, most = 0;
   };
 
-  /// The least fraction of the size that a further trial is expected to save (lab/037).
-  static constexpr double kLeastSaving = 0.03;
-
-  MultiplierSearch(double initial_multiplier, Range wanted)
-      : multiplier_(initial_multiplier), wanted_(wanted) {}
+  /// `least_saving`: the least fraction of the size that a further trial is expected to save.
+  MultiplierSearch(double initial_multiplier, Range wanted, double least_saving)
+      : multiplier_(initial_multiplier), wanted_(wanted), least_saving_(least_saving) {}
 
   /// The multiplier of the next trial.
   double multiplier() const { return multiplier_; }
@@ -55,6 +53,7 @@ class MultiplierSearch {
 
   double multiplier_;
   Range wanted_;
+  double least_saving_;
   std::vector<Trial> trials_;  ///< by multiplier, ascending
   /// Logarithm of the smallest accepted size.
   double smallest_ = std::numeric_limits<double>::infinity();

@@ -38,6 +38,10 @@ constexpr double kStartPatches = 1000, kStartGrowth = 1.5, kHighestStart = 8;
 // Operators without cluster bases, form factors, usually end at 2.5 to 22 times it (lab/037).
 constexpr double kPlainStart = 2;
 
+// The least fraction of the size that a further round is expected to save (lab/037). A round of
+// form factors takes as long as a tenth of the solves that they are made for (lab/180).
+constexpr double kLeastSaving = 0.03, kPlainLeastSaving = 0.08;
+
 // The time of a vector and of a block in a product, beside their values, in units of a value. It
 // counts in full in operators of kSizedPatches patches and in part in smaller ones: coefficients
 // that the nearest caches do not hold, and the start of loops (lab/036).
@@ -163,7 +167,8 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
   report_progress(progress, 0);
   const double tolerance = settings.tolerance;
   MultiplierSearch search(compression.multiplier_for(search_start(settings, patches.size())),
-                          {kAim * tolerance, kMost * tolerance});
+                          {kAim * tolerance, kMost * tolerance},
+                          settings.cluster_bases ? kLeastSaving : kPlainLeastSaving);
   Best best(kMost * tolerance);
   WorstLights worst(kMost * kLargestOverMean * tolerance);
   for (int round = 0; round < kMostRounds && !search.done(); ++round) {

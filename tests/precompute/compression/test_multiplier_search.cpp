@@ -13,6 +13,7 @@ namespace rebounce::test_multiplier_search {
 namespace {
 
 constexpr MultiplierSearch::Range kWanted{0.72, 0.8};
+constexpr double kLeastSaving = 0.03;
 
 // Errors of less leave more to save than is left, along kShrinking.
 constexpr double kShrinking = 0.3, kLeastGood = 0.65;
@@ -23,8 +24,9 @@ struct Found {
   int rounds = 0;
 };
 
-Found search(double initial_multiplier, const std::function<double(double)>& error_of) {
-  MultiplierSearch search(initial_multiplier, kWanted);
+Found search(double initial_multiplier, const std::function<double(double)>& error_of,
+             double least_saving = kLeastSaving) {
+  MultiplierSearch search(initial_multiplier, kWanted, least_saving);
   Found found;
   while (!search.done() && found.rounds < 50) {
     const double multiplier = search.multiplier();
@@ -43,6 +45,15 @@ void expect_good(const Found& found, int most_rounds) {
   EXPECT_GE(found.error, kLeastGood);
   EXPECT_LE(found.error, kWanted.most);
   EXPECT_LE(found.rounds, most_rounds);
+}
+
+TEST(MultiplierSearch, EndsSoonerWhereLittleSavingIsNotWanted) {
+  const auto error_of = [](double multiplier) { return 0.7 * std::sqrt(multiplier); };
+  // From errors of 0.35 on, sizes may fall by a third.
+  const Found usual = search(0.25, error_of), rough = search(0.25, error_of, 0.5);
+  EXPECT_EQ(rough.rounds, 1);
+  EXPECT_GT(usual.rounds, 1);
+  EXPECT_LT(usual.size, 0.75 * rough.size);
 }
 
 TEST(MultiplierSearch, FindsARootInOneStepFromAnywhereWithinReach) {
@@ -76,7 +87,7 @@ TEST(MultiplierSearch, BendsWithAFloorAndACeiling) {
 /// Whether a search ends at an error of 0.6 that a second trial gives, of so much of the size of
 /// the first, whose error was half of it.
 bool ends_at(double part_of_size) {
-  MultiplierSearch search(1, kWanted);
+  MultiplierSearch search(1, kWanted, kLeastSaving);
   search.report(0.3, 1000);
   EXPECT_FALSE(search.done());
   search.report(0.6, 1000 * part_of_size);
@@ -89,7 +100,7 @@ TEST(MultiplierSearch, EndsWhereAnotherTrialWouldSaveLittle) {
 }
 
 TEST(MultiplierSearch, DoesNotEndWhileNoErrorWasGood) {
-  MultiplierSearch search(1, kWanted);
+  MultiplierSearch search(1, kWanted, kLeastSaving);
   for (const double error : {5.0, 3.0, 2.0, 0.81}) {
     search.report(error, 1000);
     EXPECT_FALSE(search.done()) << error;
