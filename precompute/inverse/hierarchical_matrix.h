@@ -15,8 +15,8 @@ namespace rebounce {
 /// A hierarchical operator of any precision as a SymmetricMatrix, decoded to f32.
 class HierarchicalMatrix final : public SymmetricMatrix {
  public:
-  /// Vectors side by side, row-major: a row for each position, also those that hold no patch.
-  using Vectors = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  /// A row for each position, also those that hold no patch.
+  using Vectors = RowVectors;
 
   /// `group`: SymmetricMatrix::group.
   explicit HierarchicalMatrix(const HierarchicalStorage& storage,

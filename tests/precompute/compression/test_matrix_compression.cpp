@@ -5,9 +5,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdio>
+#include <optional>
 #include <random>
+#include <span>
+#include <vector>
 
 #include "precompute/inverse/hierarchical_matrix.h"
 #include "tests/support/solved_room.h"
@@ -134,6 +138,81 @@ TEST(MatrixCompression, BlocksOfLowRankOnTheDiagonalAreCompressedAgain) {
   for (const std::vector<Float3>& light : test::unshadowed_lights(patches, 4, 2, 2.2, 0.7)) {
     EXPECT_LT(relative_difference(product(again, light), product(whole, light), patches.area),
               1e-3);
+  }
+}
+
+/// A floor of 4 m by 5 m.
+PatchTable floor_patches(std::size_t along_x, std::size_t along_z) {
+  PatchTable patches;
+  const float width = 4.0F / static_cast<float>(along_x),
+              depth = 5.0F / static_cast<float>(along_z);
+  for (std::size_t k = 0; k < along_x * along_z; ++k) {
+    const float x = width * (0.5F + static_cast<float>(k % along_x)),
+                z = depth * (0.5F + static_cast<float>(k / along_x));
+    patches.area.push_back(width * depth);
+    patches.centroid.push_back({x, 0, z});
+    patches.normal.push_back({0, 1, 0});
+    patches.reflectance.push_back({0.5F, 0.5F, 0.5F});
+  }
+  patches.emitted_exitance.resize(patches.size());
+  patches.sky_visibility.resize(patches.size());
+  patches.absorbed.resize(patches.size());
+  return patches;
+}
+
+/// A matrix whose largest block that is read is known.
+class Watched final : public SymmetricMatrix {
+ public:
+  Watched(const SymmetricMatrix& matrix, bool has_parts) : matrix_(matrix), has_parts_(has_parts) {}
+
+  std::span<const float> area() const override { return matrix_.area(); }
+  void entries(std::uint32_t matrix, std::span<const std::uint32_t> rows,
+               std::span<const std::uint32_t> columns,
+               Eigen::Ref<Eigen::MatrixXf> entries) const override {
+    const std::size_t side = std::max(rows.size(), columns.size());
+    for (std::size_t before = largest; before < side;) {
+      if (largest.compare_exchange_weak(before, side)) break;
+    }
+    matrix_.entries(matrix, rows, columns, entries);
+  }
+  bool has_parts() const override { return has_parts_; }
+  std::optional<JointEntryParts> parts(std::span<const std::uint32_t> rows,
+                                       std::span<const std::uint32_t> columns) const override {
+    return matrix_.parts(rows, columns);
+  }
+  Eigen::MatrixXf multiply(std::uint32_t matrix, const Eigen::MatrixXf& x) const override {
+    return matrix_.multiply(matrix, x);
+  }
+  Eigen::VectorXd energies(std::span<const std::uint32_t> /*order*/) const override {
+    return Eigen::VectorXd::Ones(static_cast<Eigen::Index>(area().size()));
+  }
+
+  mutable std::atomic<std::size_t> largest = 0;
+
+ private:
+  const SymmetricMatrix& matrix_;
+  bool has_parts_;
+};
+
+TEST(MatrixCompression, LargeBlocksOfPartsAreCompressedWithoutBeingRead) {
+  constexpr double kFine = kMultiplier / 100;
+  const PatchTable patches = floor_patches(72, 72);  // pieces of more than 512 positions
+  std::vector<float> v;
+  for (const Float3& at : patches.centroid) v.push_back(0.01F * std::exp(-0.3F * at[0] * at[2]));
+  const HierarchicalOperator whole = one_block(v, patches);
+  const HierarchicalMatrix matrix(whole.storage());
+  const auto training = test::unshadowed_lights(patches, 8, 1, 0, 2);
+  const Watched read(matrix, false), multiplied(matrix, true);
+  const HierarchicalOperator of_entries(compress_matrix(read, patches, training, kFine)),
+      of_parts(compress_matrix(multiplied, patches, training, kFine));
+  EXPECT_GT(read.largest, 512U);
+  EXPECT_LE(multiplied.largest, 512U);
+  EXPECT_NEAR(static_cast<double>(of_parts.bytes()) / static_cast<double>(of_entries.bytes()), 1,
+              0.02);
+  for (const std::vector<Float3>& light : test::unshadowed_lights(patches, 4, 2, 0, 2)) {
+    const auto truth = product(whole, light);
+    EXPECT_LT(relative_difference(product(of_entries, light), truth, patches.area), 1e-3);
+    EXPECT_LT(relative_difference(product(of_parts, light), truth, patches.area), 1e-3);
   }
 }
 
