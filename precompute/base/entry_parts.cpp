@@ -34,7 +34,7 @@ void add_to_rows(const Product& product, const Indices& indices, RowVectors& vec
     vectors.middleRows(indices.front(), count).noalias() += product;
     return;
   }
-  const RowVectors some = product;
+  const RowVectors& some = product;
   for (Index k = 0; k < count; ++k) vectors.row(indices[k]) += some.row(k);
 }
 

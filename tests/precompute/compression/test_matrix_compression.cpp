@@ -147,8 +147,9 @@ PatchTable floor_patches(std::size_t along_x, std::size_t along_z) {
   const float width = 4.0F / static_cast<float>(along_x),
               depth = 5.0F / static_cast<float>(along_z);
   for (std::size_t k = 0; k < along_x * along_z; ++k) {
-    const float x = width * (0.5F + static_cast<float>(k % along_x)),
-                z = depth * (0.5F + static_cast<float>(k / along_x));
+    const std::size_t column = k % along_x, row = k / along_x;
+    const float x = width * (0.5F + static_cast<float>(column)),
+                z = depth * (0.5F + static_cast<float>(row));
     patches.area.push_back(width * depth);
     patches.centroid.push_back({x, 0, z});
     patches.normal.push_back({0, 1, 0});
