@@ -1,12 +1,12 @@
 #include "precompute/compression/block_compression.h"
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
+#include "precompute/base/orthonormal_columns.h"
 #include "precompute/base/random_signs.h"
 
 namespace rebounce {
@@ -85,7 +85,7 @@ class RowSpectrum : public Spectrum {
       const double energy = block.entries.squaredNorm();
       const Digits digits = price > kSinglePrecision * energy ? Digits::kSingle : Digits::kDouble;
       const MatrixXd range =
-          range_of(times(block, signs(Shape(block), largest_rank, seed), digits));
+          orthonormal_columns(times(block, signs(Shape(block), largest_rank, seed), digits));
       MatrixXd block_in_range = range.transpose() * block.entries;
       const double lost = std::max(0.0, energy - block_in_range.squaredNorm());
       find_directions(range, std::move(block_in_range), lost);
@@ -98,7 +98,8 @@ class RowSpectrum : public Spectrum {
 
   RowSpectrum(const StructuredBlock& block, Index largest_rank, double /*price*/,
               std::uint64_t seed) {
-    const MatrixXd range = range_of(block.times(signs(Shape(block), largest_rank, seed)));
+    const MatrixXd range =
+        orthonormal_columns(block.times(signs(Shape(block), largest_rank, seed)));
     find_directions(range, block.in_directions(range), block.energy_beside(range));
   }
 
@@ -110,12 +111,6 @@ class RowSpectrum : public Spectrum {
  private:
   static MatrixXf signs(const Shape& shape, Index largest_rank, std::uint64_t seed) {
     return random_signs(shape.matrix_count * shape.columns, largest_rank + kOversampling, seed);
-  }
-
-  /// An orthonormal basis of the columns of a sample.
-  static MatrixXd range_of(const MatrixXd& sample) {
-    return Eigen::HouseholderQR<MatrixXd>(sample).householderQ() *
-           MatrixXd::Identity(sample.rows(), sample.cols());
   }
 
   /// The directions in a range, beside which the block has the energy `lost`.

@@ -1,12 +1,12 @@
 #include "precompute/compression/low_rank_transfer.h"
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <algorithm>
 #include <numeric>
 #include <random>
 
 #include "precompute/base/blas.h"
+#include "precompute/base/orthonormal_columns.h"
 #include "precompute/base/symmetric_matrix.h"
 #include "rebounce/error.h"
 #include "transfer/format/hierarchical_encoding.h"
@@ -27,11 +27,6 @@ constexpr Index kDenseSize = 700;
 constexpr Index kSketchPart = 2, kSketchMargin = 8;
 constexpr int kIterations = 4;
 
-MatrixXf orthonormal(const MatrixXf& a) {
-  return Eigen::HouseholderQR<MatrixXf>(a).householderQ() *
-         MatrixXf::Identity(a.rows(), std::min(a.rows(), a.cols()));
-}
-
 MatrixXf random_start(Index rows, Index columns) {
   std::mt19937 engine(1);
   MatrixXf random(rows, columns);
@@ -47,7 +42,7 @@ MatrixXf iterate(const DenseMatrix& dense, const MatrixXf& basis) {
   for (std::uint32_t m = 0; m < dense.matrix_count(); ++m) {
     sum += dense.multiply(m, dense.multiply(m, basis));
   }
-  return orthonormal(sum);
+  return orthonormal_columns(sum);
 }
 
 /// Yhat V of each matrix, for the leading eigenvectors V of sum Yhat² within the span of `basis`.
@@ -114,7 +109,7 @@ std::shared_ptr<const HierarchicalOperator> build_low_rank_transfer(const DenseO
   const Index columns = rank + rank / kSketchPart + kSketchMargin;
   MatrixXf basis = MatrixXf::Identity(n, n);
   if (n > kDenseSize && columns < n) {
-    basis = orthonormal(random_start(n, columns));
+    basis = orthonormal_columns(random_start(n, columns));
     for (int k = 0; k < kIterations; ++k) {
       basis = iterate(matrix, basis);
       report_progress(progress, (k + 1.0) / (kIterations + 1));

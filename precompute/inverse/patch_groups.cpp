@@ -9,6 +9,7 @@
 #include <numeric>
 #include <utility>
 
+#include "precompute/base/orthonormal_columns.h"
 #include "precompute/base/random_signs.h"
 
 namespace rebounce {
@@ -54,11 +55,6 @@ class ScaledExchange {
   VectorXd scale_;
 };
 
-void make_orthonormal_columns(MatrixXd& x) {
-  const Eigen::HouseholderQR<MatrixXd> qr(x);
-  x = qr.householderQ() * MatrixXd::Identity(x.rows(), x.cols());
-}
-
 /// The eigenvectors of light that stays, [n][k].
 MatrixXd lasting_light(const SymmetricMatrix& form_factors, const Progress& progress) {
   const ScaledExchange exchange(form_factors);
@@ -66,11 +62,10 @@ MatrixXd lasting_light(const SymmetricMatrix& form_factors, const Progress& prog
   MatrixXd x = random_signs(static_cast<std::uint32_t>(n),
                             static_cast<std::uint32_t>(std::min(n, kMostPatchGroups)), kSeed)
                    .cast<double>();
-  make_orthonormal_columns(x);
+  x = orthonormal_columns(x);
   for (int step = 0; step < kSubspaceSteps; ++step) {
     report_progress(progress, step / (kSubspaceSteps + 1.0));
-    x = exchange.times(x);
-    make_orthonormal_columns(x);
+    x = orthonormal_columns(exchange.times(x));
   }
   const MatrixXd projected = x.transpose() * exchange.times(x);
   const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(0.5 * (projected + projected.transpose()));

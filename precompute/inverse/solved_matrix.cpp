@@ -24,7 +24,6 @@ void SolvedMatrix::set_entries(SharedBases bases, std::vector<PackedCouplings> c
 struct SolvedMatrix::Run {
   std::uint32_t cell = 0;
   Index begin = 0;   ///< of its first patch in the list
-  Index first = 0;   ///< of its vectors among those of all runs
   MatrixXf vectors;  ///< rows of the basis of the cell, [patches of the run][rank]
 };
 
@@ -32,19 +31,17 @@ std::vector<SolvedMatrix::Run> SolvedMatrix::runs_of(std::uint32_t matrix,
                                                      std::span<const std::uint32_t> patches,
                                                      Which vectors) const {
   std::vector<Run> runs;
-  Index first = 0;
   for (std::size_t begin = 0, end = 0; begin < patches.size(); begin = end) {
     const std::uint32_t cell = place_[patches[begin]].cell;
     while (end < patches.size() && place_[patches[end]].cell == cell) ++end;
     const SharedBases::Basis& basis = bases_.bases[matrix][cell];
     const Index rank = vectors == Which::kAll ? basis.vectors.cols() : basis.far_rank;
-    Run& run = runs.emplace_back(Run{cell, static_cast<Index>(begin), first, {}});
+    Run& run = runs.emplace_back(Run{cell, static_cast<Index>(begin), {}});
     run.vectors.resize(static_cast<Index>(end - begin), rank);
     for (std::size_t k = begin; k < end; ++k) {
       run.vectors.row(static_cast<Index>(k - begin)) =
           basis.vectors.row(place_[patches[k]].index).head(rank);
     }
-    first += rank;
   }
   return runs;
 }
@@ -114,6 +111,7 @@ EntryParts SolvedMatrix::later_parts(std::uint32_t matrix, std::span<const Run> 
   const Index right_count = right.empty() ? 0 : right.back().begin + right.back().vectors.rows();
   EntryParts parts;
   for (const Run& run : left) {
+    if (run.vectors.cols() == 0) continue;
     EntryPart part{indices(run.begin, run.vectors.rows()), indices(0, right_count), run.vectors,
                    MatrixXf::Zero(right_count, run.vectors.cols())};
     for (const Run& other : right) {
@@ -121,7 +119,7 @@ EntryParts SolvedMatrix::later_parts(std::uint32_t matrix, std::span<const Run> 
       part.right.block(other.begin, 0, other.vectors.rows(), between.rows()).noalias() =
           other.vectors.leftCols(between.cols()) * between.transpose();
     }
-    if (part.is_product()) parts.push_back(std::move(part));
+    parts.push_back(std::move(part));
   }
   return parts;
 }
@@ -132,7 +130,9 @@ EntryParts SolvedMatrix::later_parts(std::uint32_t matrix, std::span<const std::
   const std::vector<Run> of_rows = runs_of(matrix, rows, which),
                          of_columns = runs_of(matrix, columns, which);
   const auto vector_count = [](const std::vector<Run>& runs) {
-    return runs.empty() ? 0 : runs.back().first + runs.back().vectors.cols();
+    Index count = 0;
+    for (const Run& run : runs) count += run.vectors.cols();
+    return count;
   };
   if (vector_count(of_rows) <= vector_count(of_columns)) {
     return later_parts(matrix, of_rows, of_columns);

@@ -1,12 +1,12 @@
 #include "precompute/inverse/solved_transfer.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <random>
 #include <utility>
 
 #include "precompute/base/blas.h"
+#include "precompute/base/orthonormal_columns.h"
 #include "precompute/base/parallel_loop.h"
 #include "precompute/base/ranks.h"
 #include "precompute/inverse/dense_transfer.h"
@@ -134,8 +134,7 @@ SolvedTransfer::Leading SolvedTransfer::find_leading(const Eigen::VectorXf& root
     leading.vectors = Vectors::NullaryExpr(position_count(), count, [&] { return sign(engine); });
   }
   for (int step = other == nullptr ? 0 : kLeadingSteps - kFurtherSteps;; ++step) {
-    const Eigen::HouseholderQR<MatrixXf> qr(root.asDiagonal() * leading.vectors);
-    leading.vectors = qr.householderQ() * MatrixXf::Identity(position_count(), count);
+    leading.vectors = orthonormal_columns(MatrixXf(root.asDiagonal() * leading.vectors));
     const bool last = step == kLeadingSteps;
     leading.gathered =
         gather_all(last ? form_factors_ : of_steps(), root.asDiagonal() * leading.vectors);
