@@ -146,9 +146,10 @@ class TransferBuild {
     if (decided_.operator_kind == OperatorKind::kNoOperator) return;
     const bool links = decided_.exchange_source == ExchangeSource::kLinks;
     const std::vector<KindError> errors =
-        links ? make_operator_from_links(std::move(links_), *tracer_, model_.shown_patch, decided_,
-                                         roles_, data_, report_, clock_)
-              : make_operator_from_pairs(*tracer_, decided_, roles_, data_, report_, clock_);
+        links
+            ? make_operator_from_links(std::move(links_), std::move(fewer_links_), *tracer_,
+                                       model_.shown_patch, decided_, roles_, data_, report_, clock_)
+            : make_operator_from_pairs(*tracer_, decided_, roles_, data_, report_, clock_);
     make_outputs_of_operator(model_.shown_patch, *tracer_, decided_, data_, report_, clock_);
     record_build(decided_, report_, errors, data_);
   }
@@ -174,9 +175,10 @@ class TransferBuild {
 
   /// Finds links: for an operator, or else into the data.
   EscapedLight find_linked() {
-    LinkBuild build =
+    FoundLinks build =
         find_links(model_, tracer(), roles_, judges_links(), decided_, data_, report_, clock_);
     links_ = std::move(build.form_factors);
+    fewer_links_ = std::move(build.fewer);
     if (decided_.operator_kind == OperatorKind::kNoOperator) {
       data_.links = flat_links(*std::exchange(links_, nullptr));
     }
@@ -235,6 +237,7 @@ class TransferBuild {
   PatchSelection receivers_, sources_;
   PatchRoles roles_;
   std::shared_ptr<const LinkedFormFactors> links_;
+  FormFactorLinks fewer_links_;
   std::optional<RayTracer> tracer_;
   std::optional<ThreadLimit> thread_limit_;  ///< of what follows links
 };

@@ -19,6 +19,12 @@ EscapedLight find_pairs(const PatchModel& model, const RayTracer& tracer,
                         const BuildSettings& decided, TransferData& data, BuildReport& report,
                         PhaseClock& clock);
 
+/// Links, and what finding them has given.
+struct FoundLinks : LinkBuild {
+  /// Those chosen again from these (fit_links), if they were judged by them; or empty.
+  FormFactorLinks fewer;
+};
+
 /// Finds what patches exchange as links, and records it in `report`. `decided`: settings that leave
 /// nothing open.
 ///
@@ -28,9 +34,9 @@ EscapedLight find_pairs(const PatchModel& model, const RayTracer& tracer,
 /// limit allows and it helps. The patches and the mesh of `model` are lent to `data` meanwhile.
 ///
 /// Throws Cancelled if asked to stop.
-LinkBuild find_links(PatchModel& model, const RayTracer& tracer, const PatchRoles& roles,
-                     bool judged, BuildSettings& decided, TransferData& data, BuildReport& report,
-                     PhaseClock& clock);
+FoundLinks find_links(PatchModel& model, const RayTracer& tracer, const PatchRoles& roles,
+                      bool judged, BuildSettings& decided, TransferData& data, BuildReport& report,
+                      PhaseClock& clock);
 
 /// Forecasts the number of links, from a sample. Throws Cancelled if asked to stop.
 std::size_t forecast_links(const PatchModel& model, const RayTracer& tracer,

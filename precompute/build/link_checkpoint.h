@@ -4,7 +4,7 @@
 #include <string>
 
 #include "precompute/base/checkpoint.h"
-#include "precompute/exchange/links/links.h"
+#include "precompute/build/exchange_stage.h"
 #include "precompute/patches/patch_model.h"
 #include "rebounce/build_settings.h"
 #include "transfer/data/patch_roles.h"
@@ -19,7 +19,7 @@ struct LinkLimits {
 
 /// Links as near to exact form factors as they get, with the link_epsilon that they have.
 struct JudgedLinks {
-  LinkBuild build;
+  FoundLinks build;
   double epsilon = 0;
   LinkLimits limits;
 };

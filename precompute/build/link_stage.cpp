@@ -8,6 +8,7 @@
 #include "precompute/build/exchange_stage.h"
 #include "precompute/build/link_checkpoint.h"
 #include "precompute/build/operator_stage.h"
+#include "precompute/exchange/links/link_fitting.h"
 #include "precompute/exchange/links/links.h"
 #include "precompute/lights/link_error.h"
 
@@ -93,12 +94,16 @@ JudgedLinks near_enough_links(PatchModel& model, const RayTracer& tracer, const 
   LinkBuilder builder(model, tracer, decided.form_factors);
   double last_error = 0;
   for (int round = 1;; ++round) {
-    LinkBuild found = clock.run(round == 1 ? "form factors" : "finer links",
-                                [&](const Progress& part) { return builder.build(epsilon, part); });
+    FoundLinks found{clock.run(round == 1 ? "form factors" : "finer links",
+                               [&](const Progress& part) { return builder.build(epsilon, part); }),
+                     {}};
     if (!judged || round == kMostRounds) return {std::move(found), epsilon, limits};
+    found.fewer = clock.run("fewer links", [&](const Progress& part) {
+      return fit_links(found.form_factors, model.patches, kErrorPerLink, part);
+    });
     const double error = clock.run("check of links", [&](const Progress& part) {
       const LentPatches lent(model, found, data);
-      return error_of_links(found.form_factors, data, model.shown_patch, tracer, roles,
+      return error_of_links(found.form_factors, found.fewer, data, model.shown_patch, tracer, roles,
                             decided.form_factors.seed, part)
           .mean;
     });
@@ -118,9 +123,9 @@ JudgedLinks near_enough_links(PatchModel& model, const RayTracer& tracer, const 
 
 }  // namespace
 
-LinkBuild find_links(PatchModel& model, const RayTracer& tracer, const PatchRoles& roles,
-                     bool judged, BuildSettings& decided, TransferData& data, BuildReport& report,
-                     PhaseClock& clock) {
+FoundLinks find_links(PatchModel& model, const RayTracer& tracer, const PatchRoles& roles,
+                      bool judged, BuildSettings& decided, TransferData& data, BuildReport& report,
+                      PhaseClock& clock) {
   const Checkpoint checkpoint(decided.checkpoint, identity_of_links(model, roles, judged, decided));
   JudgedLinks links;
   if (!find_kept_links(checkpoint, model.patches, decided.memory_limit_bytes, links)) {

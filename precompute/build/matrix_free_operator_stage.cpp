@@ -9,8 +9,8 @@
 #include "precompute/compression/form_factor_compression.h"
 #include "precompute/compression/matrix_free_transfer.h"
 #include "precompute/exchange/links/link_fitting.h"
-#include "precompute/inverse/corrected_solver.h"
 #include "precompute/inverse/dense_transfer.h"
+#include "precompute/lights/corrected_solver.h"
 #include "precompute/lights/error_reference.h"
 #include "precompute/lights/fitting_lights.h"
 #include "precompute/lights/measured_error.h"
@@ -123,10 +123,12 @@ class LinkedOperator {
         report_(report),
         clock_(clock) {}
 
-  std::vector<KindError> make(std::span<const std::uint32_t> shown_patch) {
-    FormFactorLinks fewer = clock_.run("fewer links", [&](const Progress& part) {
-      return fit_links(links_, data_.patches, kErrorPerLink, part);
-    });
+  std::vector<KindError> make(FormFactorLinks fewer, std::span<const std::uint32_t> shown_patch) {
+    if (fewer.empty()) {
+      fewer = clock_.run("fewer links", [&](const Progress& part) {
+        return fit_links(links_, data_.patches, kErrorPerLink, part);
+      });
+    }
     find_fitting_lights(fewer);
     if (!decided_.store_links) fewer = {};
     compress_form_factors_of();
@@ -197,9 +199,15 @@ class LinkedOperator {
     report_.solve_count = solved_->solve_count();
   }
 
+  /// The light of `exitances` by the operator or, if it has roles, by what it was made from.
+  Lights nearly_exact(Exitances exitances) const {
+    return roles_.all_are_both() ? indirect_irradiances(*data_.transfer, exitances)
+                                 : solved_->solved().indirect_irradiances(exitances);
+  }
+
   /// Measures the error of the operator under lights of this `seed`.
   void check(std::uint64_t seed) {
-    solver_.emplace(solved_->solved(), links_, data_.patches, data_.transfer);
+    solver_.emplace([&](Exitances lights) { return nearly_exact(lights); }, links_, data_.patches);
     const auto truth_of = [&](Exitances some) {
       return solver_->indirect_irradiances(some,
                                            {reference_residual(decided_.tolerance), kTruthPart});
@@ -223,11 +231,8 @@ class LinkedOperator {
     links_.reset();
     if (roles_.all_are_both()) solved_.reset();
     report_.whole_error = clock_.run("check by rays", [&](const Progress& part) {
-      const auto spread = [&](Exitances lights) {
-        return solved_ ? solved_->solved().indirect_irradiances(lights)
-                       : indirect_irradiances(*data_.transfer, lights);
-      };
-      return whole_->estimate(shown_patch, tracer_, spread, part);
+      return whole_->estimate(
+          shown_patch, tracer_, [&](Exitances lights) { return nearly_exact(lights); }, part);
     });
     whole_.reset();
     solved_.reset();
@@ -266,13 +271,13 @@ class LinkedOperator {
 }  // namespace
 
 std::vector<KindError> make_operator_from_links(std::shared_ptr<const LinkedFormFactors> links,
-                                                const RayTracer& tracer,
+                                                FormFactorLinks fewer, const RayTracer& tracer,
                                                 std::span<const std::uint32_t> shown_patch,
                                                 const BuildSettings& decided,
                                                 const PatchRoles& roles, TransferData& data,
                                                 BuildReport& report, PhaseClock& clock) {
   return LinkedOperator(std::move(links), tracer, decided, roles, data, report, clock)
-      .make(shown_patch);
+      .make(std::move(fewer), shown_patch);
 }
 
 }  // namespace rebounce

@@ -7,10 +7,9 @@
 namespace rebounce {
 namespace {
 
-// Slope of the logarithm of the error over that of the multiplier: about 1/2 in the middle, less
-// where the error has a floor or everything is left out. The bounds keep a step outwards bold but
-// finite.
-constexpr double kUsualSlope = 0.5, kLeastSlope = 0.2, kMostSlope = 1;
+// Bounds of the slope of the logarithm of the error over that of the multiplier. They keep a step
+// outwards bold but finite.
+constexpr double kLeastSlope = 0.2, kMostSlope = 1;
 
 // Minus the slope of the logarithm of the size over that of the multiplier: 0.2 to 0.5 for
 // operators that are applied, 0.05 to 0.2 for form factors (lab/037).
@@ -53,7 +52,7 @@ void MultiplierSearch::report(double error, double size) {
                                               : outside(trials_.back());
   multiplier_ = std::exp(next.multiplier);
   const bool narrow = bracketed && high->multiplier - (high - 1)->multiplier < kNarrow;
-  done_ = narrow || next.size > smallest_ + std::log1p(-least_saving_);
+  done_ = narrow || next.size > smallest_ + std::log1p(-expected_.least_saving);
 }
 
 bool MultiplierSearch::contradicts(const Trial& trial, const Trial& old) {
@@ -83,7 +82,7 @@ MultiplierSearch::Next MultiplierSearch::outside(const Trial& nearest) const {
     return nearest.multiplier + std::clamp(left / slope, -kLongestStep, kLongestStep);
   };
   if (trials_.size() == 1) {
-    const double multiplier = reached(kUsualSlope);
+    const double multiplier = reached(expected_.slope);
     return {multiplier, nearest.size - kUsualShrinking * (multiplier - nearest.multiplier)};
   }
   const bool front = &nearest == &trials_.front();

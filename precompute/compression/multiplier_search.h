@@ -21,9 +21,16 @@ class MultiplierSearch {
     double aim = 0, most = 0;
   };
 
-  /// `least_saving`: the least fraction of the size that a further trial is expected to save.
-  MultiplierSearch(double initial_multiplier, Range wanted, double least_saving)
-      : multiplier_(initial_multiplier), wanted_(wanted), least_saving_(least_saving) {}
+  /// What is known before the first trial.
+  struct Expected {
+    /// Slope of the logarithm of the error over that of the multiplier.
+    double slope = 0;
+    /// The least fraction of the size that a further trial is expected to save.
+    double least_saving = 0;
+  };
+
+  MultiplierSearch(double initial_multiplier, Range wanted, Expected expected)
+      : multiplier_(initial_multiplier), wanted_(wanted), expected_(expected) {}
 
   /// The multiplier of the next trial.
   double multiplier() const { return multiplier_; }
@@ -53,7 +60,7 @@ class MultiplierSearch {
 
   double multiplier_;
   Range wanted_;
-  double least_saving_;
+  Expected expected_;
   std::vector<Trial> trials_;  ///< by multiplier, ascending
   /// Logarithm of the smallest accepted size.
   double smallest_ = std::numeric_limits<double>::infinity();

@@ -25,22 +25,24 @@ constexpr int kMostRounds = 8;
 constexpr double kAim = 0.76, kMost = 0.8;
 
 // The usual number of rounds of the search.
-constexpr int kUsualRounds = 4;
+constexpr int kUsualRounds = 3;  // lab/181
 
 // The multiplier at which the search begins, in units of the squared tolerance over the number of
 // patches (lab/037).
 constexpr double kInitialMultiplier = 2.5;
 
 // Operators with cluster bases mostly end far above that. Above kStartPatches patches, their search
-// begins higher by this power of the ratio of patch counts, up to a limit (lab/037).
-constexpr double kStartPatches = 1000, kStartGrowth = 1.5, kHighestStart = 8;
+// begins higher by this power of the ratio of patch counts, up to a limit (lab/037, lab/181).
+constexpr double kStartPatches = 1000, kStartGrowth = 1.5, kHighestStart = 13;
 
 // Operators without cluster bases, form factors, usually end at 2.5 to 22 times it (lab/037).
 constexpr double kPlainStart = 2;
 
-// The least fraction of the size that a further round is expected to save (lab/037). A round of
-// form factors takes as long as a tenth of the solves that they are made for (lab/180).
-constexpr double kLeastSaving = 0.03, kPlainLeastSaving = 0.08;
+// How errors grow with the multiplier (lab/181), and the least fraction of the size that a further
+// round is expected to save (lab/037). A round of form factors takes as long as a tenth of the
+// solves that they are made for (lab/180).
+constexpr MultiplierSearch::Expected kExpected{.slope = 0.35, .least_saving = 0.03},
+    kPlainExpected{.slope = 0.5, .least_saving = 0.08};
 
 // The time of a vector and of a block in a product, beside their values, in units of a value. It
 // counts in full in operators of kSizedPatches patches and in part in smaller ones: coefficients
@@ -168,7 +170,7 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
   const double tolerance = settings.tolerance;
   MultiplierSearch search(compression.multiplier_for(search_start(settings, patches.size())),
                           {kAim * tolerance, kMost * tolerance},
-                          settings.cluster_bases ? kLeastSaving : kPlainLeastSaving);
+                          settings.cluster_bases ? kExpected : kPlainExpected);
   Best best(kMost * tolerance);
   WorstLights worst(kMost * kLargestOverMean * tolerance);
   for (int round = 0; round < kMostRounds && !search.done(); ++round) {

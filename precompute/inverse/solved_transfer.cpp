@@ -34,7 +34,7 @@ constexpr Index kSummedRows = 128;
 
 // Vectors that are multiplied side by side. They are fewer than kBatchColumns, so that threads can
 // share the few vectors of lights.
-constexpr Index kSmallGroup = 16;
+constexpr Index kSmallGroup = 32;
 
 // Random vectors for the energies. Their relative errors are sqrt(2 / 128) = 13 %; those of their
 // roots, which light_weights.cpp uses, are 6 %.

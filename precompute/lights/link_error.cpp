@@ -3,6 +3,7 @@
 #include <utility>
 #include <vector>
 
+#include "precompute/lights/corrected_solver.h"
 #include "precompute/lights/random_lights.h"
 #include "precompute/lights/reference_solution.h"
 #include "precompute/lights/solve_batches.h"
@@ -12,26 +13,33 @@
 namespace rebounce {
 namespace {
 
-// The lights and the part of the rays that decide whether links are near enough, and the residual
-// of these lights, relative to the reflected light: it counts as an error of the links.
+// The lights and the part of the rays that decide whether links are near enough, and how far these
+// lights may be off: that counts as an error of the links.
 constexpr int kJudgingLights = 32;
-constexpr double kJudgingRays = 0.25, kJudgingResidual = 1e-4, kLeastResidual = 1e-10;
+constexpr double kJudgingRays = 0.25, kJudgingResidual = 1e-4;
+
+// The residual that fewer links solve to: what they are off by themselves (lab/015).
+constexpr double kFewerResidual = 1e-3;
 
 }  // namespace
 
 SampledError error_of_links(const std::shared_ptr<const LinkedFormFactors>& links,
-                            const TransferData& data, std::span<const std::uint32_t> shown_patch,
-                            const RayTracer& tracer, const PatchRoles& roles, std::uint64_t seed,
-                            const Progress& progress) {
-  const ReferenceSolver solver(links, data.patches);
+                            const FormFactorLinks& fewer, const TransferData& data,
+                            std::span<const std::uint32_t> shown_patch, const RayTracer& tracer,
+                            const PatchRoles& roles, std::uint64_t seed, const Progress& progress) {
+  const ReferenceSolver solver(fewer, data.patches);
+  const auto nearly_exact = [&](std::span<const std::vector<Float3>> light) {
+    return solve_batches(light, {}, [&](std::span<const std::vector<Float3>> some) {
+      return solver.indirect_irradiances(some, kFewerResidual, kFewerResidual);
+    });
+  };
   // Other rays than those of the statement that is made of the operator, which chance would favour.
   WholeErrorEstimator estimator(data, roles, mix_bits(seed),
                                 WholeErrorEstimator::sample_for(data.patches.size(), kJudgingRays));
   std::vector<std::vector<Float3>> lights = random_initial_exitances(
       data, tracer, LightKind::kPoint, kJudgingLights, mix_bits(seed + kJudgingLights), roles);
-  auto truths = solve_batches(lights, {}, [&](std::span<const std::vector<Float3>> some) {
-    return solver.indirect_irradiances(some, kLeastResidual, kJudgingResidual);
-  });
+  auto truths = CorrectedSolver(nearly_exact, links, data.patches)
+                    .indirect_irradiances(lights, {kJudgingResidual});
   for (std::size_t k = 0; k < lights.size(); ++k) {
     const std::vector<Float3> light = std::move(lights[k]), truth = std::move(truths[k]);
     if (arrives_nowhere(truth, light, data.patches.area)) continue;
@@ -39,13 +47,7 @@ SampledError error_of_links(const std::shared_ptr<const LinkedFormFactors>& link
     roles.keep(PatchRoles::kReceiver, received);
     estimator.add(light, truth, received);
   }
-  const auto transfer = [&](std::span<const std::vector<Float3>> light) {
-    return solve_batches(light, {}, [&](std::span<const std::vector<Float3>> some) {
-      constexpr double kEnough = WholeErrorEstimator::kSpreadResidual;
-      return solver.indirect_irradiances(some, kEnough, kEnough);
-    });
-  };
-  return estimator.estimate(shown_patch, tracer, transfer, progress).links;
+  return estimator.estimate(shown_patch, tracer, nearly_exact, progress).links;
 }
 
 }  // namespace rebounce

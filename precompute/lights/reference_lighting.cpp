@@ -5,6 +5,7 @@
 #include <iterator>
 #include <utility>
 
+#include "precompute/base/parallel_loop.h"
 #include "precompute/lights/random_lights.h"
 #include "transfer/base/area_norm.h"
 #include "transfer/base/parallel.h"
@@ -96,20 +97,21 @@ void ReferenceLighting::leave_out_dark() {
 }
 
 std::vector<double> ReferenceLighting::errors(const TransferOperator& transfer) const {
+  struct Scratch {
+    std::vector<Float3> result;
+    std::vector<float> workspace;
+  };
   std::vector<double> errors(lights_.size());
-  std::vector<std::vector<Float3>> results(std::min(kBatch, errors.size()),
-                                           std::vector<Float3>(area_.size()));
-  std::vector<float> workspace(transfer.workspace_size());
-  for (std::size_t first = 0; first < errors.size(); first += kBatch) {
-    const std::size_t count = std::min(kBatch, errors.size() - first);
-    for (std::size_t k = 0; k < count; ++k) {
-      transfer.apply(lights_[first + k].expanded(), results[k], workspace);
-    }
-    parallel_for({}, count, [&](std::size_t k) {
-      const std::size_t light = first + k;
-      errors[light] = received_.error(light, area_distance(results[k], truths_[light], area_));
-    });
-  }
+  parallel_loop(
+      errors.size(), 1,
+      [&] {
+        return Scratch{std::vector<Float3>(area_.size()),
+                       std::vector<float>(transfer.workspace_size())};
+      },
+      [&](std::size_t k, Scratch& scratch) {
+        transfer.apply(lights_[k].expanded(), scratch.result, scratch.workspace);
+        errors[k] = received_.error(k, area_distance(scratch.result, truths_[k], area_));
+      });
   return errors;
 }
 

@@ -17,7 +17,7 @@ class LinkRays {
   static constexpr int kMostRays = static_cast<int>(ShadowRays::kMostRays);
 
   struct Scratch {
-    std::vector<Ray> rays;
+    std::vector<Ray> rays;           ///< those that have been traced
     std::vector<float> transmitted;  ///< by ray
   };
 
@@ -32,12 +32,20 @@ class LinkRays {
     bool divided = false;  ///< mixed, and two of the children do not see each other at all
   };
 
+  /// What is asked for: the visibility, or only whether nodes see each other in full, in part or
+  /// not at all. Then few rays are traced of those that see each other in part, and nothing but
+  /// `mixed` is known of them.
+  enum class Wanted : std::uint8_t { kVisibility, kKind };
+
   /// The visibility from `count` <= kMostRays rays between points spread over two nodes.
-  Visibility trace(std::uint32_t a, std::uint32_t b, int count, Scratch& scratch) const;
+  Visibility trace(std::uint32_t a, std::uint32_t b, int count, Wanted wanted,
+                   Scratch& scratch) const;
 
  private:
+  class Joined;
+
   double first_part(const LinkNode& node) const;
-  void trace(Scratch& scratch) const;
+  void trace(std::size_t begin, Scratch& scratch) const;
   static Visibility judge(const Scratch& scratch, std::span<const double> weight,
                           std::span<const int> children);
   static bool is_divided(const Scratch& scratch, std::span<const int> children);

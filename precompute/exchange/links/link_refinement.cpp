@@ -252,6 +252,13 @@ bool LinkRefinement::needs_all_rays(const Candidate& pair) const {
   return pair.view == View::kMixed || is_doubtful(pair.a) || is_doubtful(pair.b);
 }
 
+LinkRays::Visibility LinkRefinement::trace(const Candidate& pair, int count,
+                                           LinkRays::Wanted wanted, Scratch& scratch) const {
+  const LinkRays::Visibility visible = rays_.trace(pair.a, pair.b, count, wanted, scratch.rays);
+  scratch.ray_count += scratch.rays.rays.size();
+  return visible;
+}
+
 LinkRefinement::Outcome LinkRefinement::link_nodes(const Candidate& pair, Scratch& scratch) const {
   const PairKernel& kernel = scratch.kernel;
   const double allowed = allowed_squared();
@@ -269,16 +276,18 @@ LinkRefinement::Outcome LinkRefinement::link_nodes(const Candidate& pair, Scratc
   while (count < enough) count *= 2;
   count = std::min(count, LinkRays::kMostRays);
 
-  LinkRays::Visibility visible = rays_.trace(pair.a, pair.b, count, scratch.rays);
-  scratch.ray_count += count;
+  // More rays are traced where this tells that a link would be partly hidden.
+  const bool more = count < settings_.full_rays;
+  LinkRays::Visibility visible =
+      trace(pair, count, smooth && !more ? LinkRays::Wanted::kVisibility : LinkRays::Wanted::kKind,
+            scratch);
   const auto for_rays = [&] { return kernel.norm_squared() / ((count + 2.0) * (count + 2.0)); };
   if (!visible.mixed && visible.part == 0) return make_link(pair, kernel, visible, for_rays());
   if (!smooth) return split(pair, visible.mixed ? View::kMixed : View::kClear);
   if (!visible.mixed) return make_link(pair, kernel, visible, std::max(least, for_rays()));
-  if (count < settings_.full_rays) {
+  if (more) {
     count = settings_.full_rays;
-    visible = rays_.trace(pair.a, pair.b, count, scratch.rays);
-    scratch.ray_count += count;
+    visible = trace(pair, count, LinkRays::Wanted::kVisibility, scratch);
   }
   return link_mixed(pair, kernel, visible, std::max(least, for_rays()));
 }

@@ -98,6 +98,8 @@ class LinkRefinement {
               const Progress& progress, double done);
   Outcome decide(const Candidate& pair, Scratch& scratch) const;
   Outcome link_patches(const Candidate& pair) const;
+  LinkRays::Visibility trace(const Candidate& pair, int count, LinkRays::Wanted wanted,
+                             Scratch& scratch) const;
   Outcome link_nodes(const Candidate& pair, Scratch& scratch) const;
   Outcome link_mixed(const Candidate& pair, const PairKernel& kernel,
                      const LinkRays::Visibility& visible, double least_squared) const;

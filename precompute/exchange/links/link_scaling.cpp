@@ -1,9 +1,11 @@
 #include "precompute/exchange/links/link_scaling.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
+#include "precompute/base/parallel_loop.h"
 #include "runtime/rays/float3_glm.h"
 
 namespace rebounce {
@@ -24,6 +26,9 @@ constexpr double kLeastFactorUnseeing = 1e-6;
 // Relative deviation of the row sum of links, and of that of links between nodes alone, from
 // penumbrae that links average (lab/014).
 constexpr double kSumDeviation = 0.01;
+
+// Pieces of the links that threads share.
+constexpr std::size_t kPieces = 8;
 
 /// A sum over a node, and its first moment about the centre of the node.
 struct Moments {
@@ -65,8 +70,8 @@ std::vector<Moments> pull(const LinkTree& tree, std::span<const double> x) {
   return mean;
 }
 
-/// The light that arrives at each node along its links.
-std::vector<Moments> gather_nodes(const std::vector<Moments>& mean, std::span<const Link> links) {
+/// The light that arrives at each node along some links.
+std::vector<Moments> gather_along(std::span<const Link> links, const std::vector<Moments>& mean) {
   std::vector<Moments> arrived(mean.size());
   const auto add = [&](std::uint32_t to, std::uint32_t from, double exchange,
                        const BFloat16x3& gradient_to, const BFloat16x3& gradient_from) {
@@ -81,6 +86,26 @@ std::vector<Moments> gather_nodes(const std::vector<Moments>& mean, std::span<co
     add(link.b(), link.a(), link.exchange_area, of_nodes.gradient_b, of_nodes.gradient_a);
   }
   return arrived;
+}
+
+/// The light that arrives at each node along its links. Threads share pieces of the links, whose
+/// sums are added in order.
+std::vector<Moments> gather_nodes(const std::vector<Moments>& mean, std::span<const Link> links) {
+  std::array<std::vector<Moments>, kPieces> piece;
+  parallel_loop(kPieces, [&](std::size_t p) {
+    const std::size_t begin = p * links.size() / kPieces, end = (p + 1) * links.size() / kPieces;
+    piece[p] = gather_along(links.subspan(begin, end - begin), mean);
+  });
+  std::vector<Moments>& arrived = piece[0];
+  parallel_loop(
+      arrived.size(), 1 << 12, [] { return 0; },
+      [&](std::size_t node, int) {
+        for (std::size_t p = 1; p < kPieces; ++p) {
+          arrived[node].sum += piece[p][node].sum;
+          arrived[node].first += piece[p][node].first;
+        }
+      });
+  return std::move(arrived);
 }
 
 /// The light that arrives at each of `patch_count` patches, summed over all nodes that contain it.

@@ -147,6 +147,7 @@ void LinkTree::invert_moment(std::uint32_t node) {
 }
 
 std::uint32_t LinkTree::patch_at(const LinkNode& node, double fraction) const {
+  if (node.is_leaf()) return leaf_patch(node);
   const auto begin = area_before_.begin() + node.begin, end = begin + node.count;
   const double wanted = *begin + fraction * (*end - *begin);
   const auto after = std::upper_bound(begin + 1, end, wanted);

@@ -13,7 +13,7 @@ namespace rebounce::test_multiplier_search {
 namespace {
 
 constexpr MultiplierSearch::Range kWanted{0.72, 0.8};
-constexpr double kLeastSaving = 0.03;
+constexpr double kSlope = 0.5, kLeastSaving = 0.03;
 
 // Errors of less leave more to save than is left, along kShrinking.
 constexpr double kShrinking = 0.3, kLeastGood = 0.65;
@@ -26,7 +26,7 @@ struct Found {
 
 Found search(double initial_multiplier, const std::function<double(double)>& error_of,
              double least_saving = kLeastSaving) {
-  MultiplierSearch search(initial_multiplier, kWanted, least_saving);
+  MultiplierSearch search(initial_multiplier, kWanted, {kSlope, least_saving});
   Found found;
   while (!search.done() && found.rounds < 50) {
     const double multiplier = search.multiplier();
@@ -87,7 +87,7 @@ TEST(MultiplierSearch, BendsWithAFloorAndACeiling) {
 /// Whether a search ends at an error of 0.6 that a second trial gives, of so much of the size of
 /// the first, whose error was half of it.
 bool ends_at(double part_of_size) {
-  MultiplierSearch search(1, kWanted, kLeastSaving);
+  MultiplierSearch search(1, kWanted, {kSlope, kLeastSaving});
   search.report(0.3, 1000);
   EXPECT_FALSE(search.done());
   search.report(0.6, 1000 * part_of_size);
@@ -100,7 +100,7 @@ TEST(MultiplierSearch, EndsWhereAnotherTrialWouldSaveLittle) {
 }
 
 TEST(MultiplierSearch, DoesNotEndWhileNoErrorWasGood) {
-  MultiplierSearch search(1, kWanted, kLeastSaving);
+  MultiplierSearch search(1, kWanted, {kSlope, kLeastSaving});
   for (const double error : {5.0, 3.0, 2.0, 0.81}) {
     search.report(error, 1000);
     EXPECT_FALSE(search.done()) << error;

@@ -3,9 +3,10 @@
 #include <cstddef>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
-#include "precompute/inverse/solved_transfer.h"
+#include "precompute/lights/solve_batches.h"
 #include "transfer/exchange/linked_form_factors.h"
 #include "transfer/file/transfer_data.h"
 
@@ -26,12 +27,11 @@ class CorrectedSolver {
  public:
   using Lights = std::vector<std::vector<Float3>>;  ///< [lights][n]
 
-  /// Guess and corrections are those of `nearly_inverse`, an operator that was made from
-  /// `compressed`; with a null pointer, and of one with roles, those of `compressed` itself.
-  /// `compressed` and `patches` must outlive the object.
-  CorrectedSolver(const SolvedTransfer& compressed, std::shared_ptr<const LinkedFormFactors> links,
-                  const PatchTable& patches,
-                  std::shared_ptr<const TransferOperator> nearly_inverse = {});
+  /// Guess and corrections are `nearly_exact`: those of an operator, of compressed form factors or
+  /// of fewer links. `patches`, and what `nearly_exact` refers to, must outlive the object.
+  CorrectedSolver(IrradiancesOf nearly_exact, std::shared_ptr<const LinkedFormFactors> links,
+                  const PatchTable& patches)
+      : nearly_exact_(std::move(nearly_exact)), links_(std::move(links)), patches_(patches) {}
 
   /// How far light may be off, as the last correction lets expect. The larger of two limits holds.
   struct Accuracy {
@@ -52,17 +52,15 @@ class CorrectedSolver {
     double guess_error;  ///< area norm of what the first round has changed
   };
 
-  Lights nearly_exact(std::span<const std::vector<Float3>> initial_exitances) const;
   Lights gather(const Lights& radiosities) const;
   Lights correct(std::span<const std::vector<Float3>> initial_exitances, const Lights& irradiances,
                  std::span<const Open> open) const;
   void solve_along_links(std::span<const std::vector<Float3>> initial_exitances,
                          std::span<const Open> open, double residual, Lights& irradiances) const;
 
-  const SolvedTransfer& compressed_;
+  IrradiancesOf nearly_exact_;
   std::shared_ptr<const LinkedFormFactors> links_;
   const PatchTable& patches_;
-  std::shared_ptr<const TransferOperator> nearly_inverse_;  ///< may be null
 };
 
 }  // namespace rebounce

@@ -1,4 +1,4 @@
-#include "precompute/inverse/corrected_solver.h"
+#include "precompute/lights/corrected_solver.h"
 
 #include <algorithm>
 #include <array>
@@ -7,15 +7,12 @@
 #include "precompute/base/parallel_loop.h"
 #include "precompute/base/ranks.h"
 #include "precompute/lights/reference_solution.h"
-#include "precompute/lights/solve_batches.h"
 #include "transfer/base/area_norm.h"
 #include "transfer/base/light_sum.h"
 #include "transfer/base/reflection.h"
 
 namespace rebounce {
 namespace {
-
-using Lights = CorrectedSolver::Lights;
 
 // Rounds after which a light is left to ReferenceSolver: each usually leaves a hundredth of the
 // error, with compressed form factors a thousandth. The residual that it solves to where nearly no
@@ -24,13 +21,13 @@ constexpr int kMostRounds = 4;
 constexpr double kLeastResidual = 1e-10;
 
 // Lights that one gather along the links takes: their sums just fill the registers.
-constexpr std::size_t kGathered = 8, kRows = kGathered * kChannelCount;
+constexpr std::size_t kGathered = 8, kColumns = kGathered * kChannelCount;
 
 }  // namespace
 
-Lights indirect_irradiances(const TransferOperator& transfer,
-                            std::span<const std::vector<Float3>> initial_exitances) {
-  Lights light;
+CorrectedSolver::Lights indirect_irradiances(
+    const TransferOperator& transfer, std::span<const std::vector<Float3>> initial_exitances) {
+  CorrectedSolver::Lights light;
   for (const auto& m0 : initial_exitances) light.emplace_back(m0.size());
   parallel_loop(
       light.size(), 1, [&] { return std::vector<float>(transfer.workspace_size()); },
@@ -40,24 +37,9 @@ Lights indirect_irradiances(const TransferOperator& transfer,
   return light;
 }
 
-CorrectedSolver::CorrectedSolver(const SolvedTransfer& compressed,
-                                 std::shared_ptr<const LinkedFormFactors> links,
-                                 const PatchTable& patches,
-                                 std::shared_ptr<const TransferOperator> nearly_inverse)
-    : compressed_(compressed), links_(std::move(links)), patches_(patches) {
-  if (nearly_inverse != nullptr && nearly_inverse->roles().all_are_both()) {
-    nearly_inverse_ = std::move(nearly_inverse);
-  }
-}
-
-Lights CorrectedSolver::nearly_exact(std::span<const std::vector<Float3>> initial_exitances) const {
-  if (nearly_inverse_ == nullptr) return compressed_.indirect_irradiances(initial_exitances);
-  return rebounce::indirect_irradiances(*nearly_inverse_, initial_exitances);
-}
-
 /// F times radiosities, along the links.
-Lights CorrectedSolver::gather(const Lights& radiosities) const {
-  using Columns = std::array<float, kRows>;
+CorrectedSolver::Lights CorrectedSolver::gather(const Lights& radiosities) const {
+  using Columns = std::array<float, kColumns>;
   const std::size_t n = patches_.size();
   const Ranks ranks;
   Lights gathered(radiosities.size());
@@ -85,9 +67,9 @@ Lights CorrectedSolver::gather(const Lights& radiosities) const {
   return gathered;
 }
 
-Lights CorrectedSolver::indirect_irradiances(std::span<const std::vector<Float3>> initial_exitances,
-                                             const Accuracy& accuracy) const {
-  Lights result = nearly_exact(initial_exitances);
+CorrectedSolver::Lights CorrectedSolver::indirect_irradiances(
+    std::span<const std::vector<Float3>> initial_exitances, const Accuracy& accuracy) const {
+  Lights result = nearly_exact_(initial_exitances);
   std::vector<Open> open;
   for (std::size_t k = 0; k < result.size(); ++k) {
     open.push_back({k, area_norm(result[k], patches_.area), 0});
@@ -115,8 +97,9 @@ Lights CorrectedSolver::indirect_irradiances(std::span<const std::vector<Float3>
 }
 
 /// The irradiances of the lights that are `open`, after one more round.
-Lights CorrectedSolver::correct(std::span<const std::vector<Float3>> initial_exitances,
-                                const Lights& irradiances, std::span<const Open> open) const {
+CorrectedSolver::Lights CorrectedSolver::correct(
+    std::span<const std::vector<Float3>> initial_exitances, const Lights& irradiances,
+    std::span<const Open> open) const {
   // H = F (M0 + rho H). With h = F (M0 + rho H0) and d = h - H0, H = h + Y rho d.
   Lights radiosities;
   for (const Open& o : open) {
@@ -131,7 +114,7 @@ Lights CorrectedSolver::correct(std::span<const std::vector<Float3>> initial_exi
     add_to(reflected[k], irradiances[open[k].light], -1);
     reflect(patches_.reflectance, reflected[k]);
   }
-  const Lights corrections = nearly_exact(reflected);
+  const Lights corrections = nearly_exact_(reflected);
   for (std::size_t k = 0; k < open.size(); ++k) add_to(result[k], corrections[k]);
   return result;
 }

@@ -1,15 +1,17 @@
-// Light along links that solves with compressed form factors are corrected to.
+// Light along links that solves with something near them are corrected to.
 
-#include "precompute/inverse/corrected_solver.h"
+#include "precompute/lights/corrected_solver.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <optional>
 #include <random>
+#include <utility>
 
 #include "precompute/compression/form_factor_compression.h"
 #include "precompute/compression/matrix_free_transfer.h"
+#include "precompute/exchange/links/link_fitting.h"
 #include "precompute/exchange/links/links.h"
 #include "precompute/lights/reference_solution.h"
 #include "tests/support/test_scenes.h"
@@ -20,6 +22,7 @@ namespace rebounce::test_corrected_solver {
 namespace {
 
 using Lights = std::vector<std::vector<Float3>>;
+using Exitances = std::span<const std::vector<Float3>>;
 
 // Coarser than those of builds, so that corrections matter.
 constexpr double kFormFactorTolerance = 0.01, kSolveResidual = 1e-2;
@@ -56,6 +59,18 @@ class CorrectedSolverOfRoom : public testing::Test {
     return lights;
   }
 
+  CorrectedSolver solver(IrradiancesOf nearly_exact) const {
+    return {std::move(nearly_exact), links_, patches()};
+  }
+
+  IrradiancesOf by_compressed() const {
+    return [this](Exitances some) { return solved_->indirect_irradiances(some); };
+  }
+
+  Lights truths(Exitances exitances) const {
+    return ReferenceSolver(links_, patches()).indirect_irradiances(exitances, 1e-12);
+  }
+
   double error(std::span<const Float3> light, std::span<const Float3> truth) const {
     return relative_difference(light, truth, patches().area);
   }
@@ -68,11 +83,10 @@ class CorrectedSolverOfRoom : public testing::Test {
 
 TEST_F(CorrectedSolverOfRoom, FindsTheLightOfTheLinks) {
   const Lights exitances = lights(21, 2);
-  const Lights truths = ReferenceSolver(links_, patches()).indirect_irradiances(exitances, 1e-12);
+  const Lights truths = this->truths(exitances);
   const Lights compressed = solved_->indirect_irradiances(exitances);
   for (const double residual : {1e-2, 1e-4, 1e-6}) {
-    const Lights found =
-        CorrectedSolver(*solved_, links_, patches()).indirect_irradiances(exitances, {residual});
+    const Lights found = solver(by_compressed()).indirect_irradiances(exitances, {residual});
     ASSERT_EQ(found.size(), exitances.size());
     for (std::size_t k = 0; k + 1 < found.size(); ++k) {
       EXPECT_LT(error(found[k], truths[k]), residual) << "light " << k;
@@ -86,14 +100,29 @@ TEST_F(CorrectedSolverOfRoom, MayBeginWithAnOperator) {
   const Lights exitances = lights(9, 5);
   const std::shared_ptr<const TransferOperator> nearly = build_matrix_free_transfer(
       *form_factors_, patches(), fitting_lights(6), {.compression = {.tolerance = 0.03}});
-  const Lights truths = ReferenceSolver(links_, patches()).indirect_irradiances(exitances, 1e-12);
+  const Lights truths = this->truths(exitances);
   for (const double residual : {1e-2, 1e-5}) {
-    const Lights found = CorrectedSolver(*solved_, links_, patches(), nearly)
-                             .indirect_irradiances(exitances, {residual});
+    const Lights found = solver([&](Exitances some) {
+                           return indirect_irradiances(*nearly, some);
+                         }).indirect_irradiances(exitances, {residual});
     for (std::size_t k = 0; k + 1 < found.size(); ++k) {
       EXPECT_LT(error(found[k], truths[k]), residual) << "light " << k;
       EXPECT_GT(error(product(*nearly, exitances[k]), truths[k]), 2e-3) << "light " << k;
     }
+  }
+}
+
+TEST_F(CorrectedSolverOfRoom, MayBeginWithFewerLinks) {
+  const Lights exitances = lights(9, 7);
+  const ReferenceSolver fewer(fit_links(links_, patches()), patches());
+  const IrradiancesOf nearly_exact = [&](Exitances some) {
+    return fewer.indirect_irradiances(some, 1e-3);
+  };
+  const Lights nearly = nearly_exact(exitances), truths = this->truths(exitances);
+  const Lights found = solver(nearly_exact).indirect_irradiances(exitances, {1e-5});
+  for (std::size_t k = 0; k + 1 < found.size(); ++k) {
+    EXPECT_LT(error(found[k], truths[k]), 1e-5) << "light " << k;
+    EXPECT_GT(error(nearly[k], truths[k]), 2e-4) << "light " << k;
   }
 }
 
@@ -103,9 +132,10 @@ TEST_F(CorrectedSolverOfRoom, LeavesWhatCompressedFormFactorsCannotTellToTheLink
   darker.reflectance.assign(darker.size(), {0.05F, 0.05F, 0.05F});
   const SolvedTransfer solved(*form_factors_, darker, kSolveResidual);
   const Lights exitances = lights(5, 3);
-  const Lights truths = ReferenceSolver(links_, patches()).indirect_irradiances(exitances, 1e-12);
-  const Lights found =
-      CorrectedSolver(solved, links_, patches()).indirect_irradiances(exitances, {1e-5});
+  const Lights truths = this->truths(exitances);
+  const Lights found = solver([&](Exitances some) {
+                         return solved.indirect_irradiances(some);
+                       }).indirect_irradiances(exitances, {1e-5});
   for (std::size_t k = 0; k + 1 < found.size(); ++k) {
     EXPECT_LT(error(found[k], truths[k]), 1e-4) << "light " << k;
   }
@@ -113,9 +143,7 @@ TEST_F(CorrectedSolverOfRoom, LeavesWhatCompressedFormFactorsCannotTellToTheLink
 
 TEST_F(CorrectedSolverOfRoom, HasTheSameBitsForAnyNumberOfThreads) {
   const Lights exitances = lights(12, 4);
-  const auto make = [&] {
-    return CorrectedSolver(*solved_, links_, patches()).indirect_irradiances(exitances, {1e-4});
-  };
+  const auto make = [&] { return solver(by_compressed()).indirect_irradiances(exitances, {1e-4}); };
   EXPECT_EQ(test::with_threads(1, make), test::with_threads(3, make));
 }
 
