@@ -54,13 +54,13 @@ std::vector<KindError> make_operator_from_pairs(const RayTracer& tracer,
                                                 BuildReport& report, PhaseClock& clock);
 
 /// Makes it from `links`; `fewer` are chosen again from them (fit_links), or empty: then they are
-/// found here. They go into data.links on request. F is compressed, and the
-/// inverse is solved for without being stored as a whole (matrix_free_transfer.h). The error is
-/// measured against the links, which neither compression affects; an operator that errs too much
-/// under a single lamp is compressed once more, finer. If no tolerance of form factors is set, it
-/// is reduced by the fraction of the light that receivers get. How far links and operator together
-/// are from exact form factors is estimated by rays; `shown_patch` [t] is that of PatchModel. The
-/// memory limit of `decided` is for what comes on top of what the process held before links.
+/// found here. They go into data.links on request. F is compressed, and the inverse is solved for
+/// without being stored as a whole (matrix_free_transfer.h). The error is measured against the
+/// links, which neither compression affects; an operator that errs too much under a single lamp is
+/// compressed once more, finer. If no tolerance of form factors is set, it is reduced by the
+/// fraction of the light that receivers get. How far links and operator together are from exact
+/// form factors is estimated by rays; `shown_patch` [t] is that of PatchModel. The memory limit of
+/// `decided` is for what comes on top of what the process held before links.
 std::vector<KindError> make_operator_from_links(std::shared_ptr<const LinkedFormFactors> links,
                                                 FormFactorLinks fewer, const RayTracer& tracer,
                                                 std::span<const std::uint32_t> shown_patch,
