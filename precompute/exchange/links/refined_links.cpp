@@ -62,16 +62,16 @@ void RefinedLinks::refine(double epsilon, const Progress& progress) {
   }
   refinement_.refine(epsilon, part_of(progress, 0.0, 0.4));
   if (target_.empty()) {
-    hemispheres_.trace(part_of(progress, 0.4, 0.42));
+    hemispheres_.trace(part_of(progress, 0.4, 0.5));
     target_ = row_sum_targets(escape(), settings_.hemisphere_rays);
   }
-  measure(epsilon, part_of(progress, 0.42, 0.76));
+  measure(epsilon, part_of(progress, 0.5, 0.78));
   const std::vector<double> ones(target_.size(), 1.0);
   refinement_.revise(
       find_doubtful_rows(gather_links(tree_, links(), ones), target_, kLinkRowSumTolerance),
-      part_of(progress, 0.76, 0.82));
+      part_of(progress, 0.78, 0.85));
   add_seen();
-  measure(epsilon, part_of(progress, 0.82, 1.0));
+  measure(epsilon, part_of(progress, 0.85, 1.0));
 }
 
 /// Measures the links between single patches that are new, and what more rays tell of coarse ones.
