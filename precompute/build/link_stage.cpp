@@ -85,6 +85,21 @@ bool finer_fit(std::uint64_t bytes, std::uint64_t limit, LinkLimits& limits) {
   return fits;
 }
 
+/// What the light of `found` is off by, in the mean; finds fewer links, which tell it.
+double judge(PatchModel& model, const RayTracer& tracer, const PatchRoles& roles,
+             const BuildSettings& decided, FoundLinks& found, TransferData& data,
+             PhaseClock& clock) {
+  found.fewer = clock.run("fewer links", [&](const Progress& part) {
+    return fit_links(found.form_factors, model.patches, kErrorPerLink, part);
+  });
+  return clock.run("check of links", [&](const Progress& part) {
+    const LentPatches lent(model, found, data);
+    return error_of_links(found.form_factors, found.fewer, data, model.shown_patch, tracer, roles,
+                          decided.form_factors.seed, part)
+        .mean;
+  });
+}
+
 /// Makes links, and while they are `judged`, finer ones from them until they are near enough.
 JudgedLinks near_enough_links(PatchModel& model, const RayTracer& tracer, const PatchRoles& roles,
                               bool judged, const BuildSettings& decided, TransferData& data,
@@ -98,15 +113,7 @@ JudgedLinks near_enough_links(PatchModel& model, const RayTracer& tracer, const 
                                [&](const Progress& part) { return builder.build(epsilon, part); }),
                      {}};
     if (!judged || round == kMostRounds) return {std::move(found), epsilon, limits};
-    found.fewer = clock.run("fewer links", [&](const Progress& part) {
-      return fit_links(found.form_factors, model.patches, kErrorPerLink, part);
-    });
-    const double error = clock.run("check of links", [&](const Progress& part) {
-      const LentPatches lent(model, found, data);
-      return error_of_links(found.form_factors, found.fewer, data, model.shown_patch, tracer, roles,
-                            decided.form_factors.seed, part)
-          .mean;
-    });
+    const double error = judge(model, tracer, roles, decided, found, data, clock);
     const bool helps = round == 1 || error < kLeastGain * last_error;
     const bool is_last = error <= kAccepted * decided.tolerance || !helps;
     const double finer = finer_epsilon(epsilon, error, decided.tolerance);
