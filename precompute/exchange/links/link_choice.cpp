@@ -15,8 +15,8 @@ using Eigen::Vector3d;
 
 // Side, in patches, of the blocks in which links are chosen. In scenes of thousands of patches no
 // single link is worth a larger block, and the tables of larger blocks do not fit into caches
-// (lab/016).
-constexpr std::uint32_t kBlockSide = 256;
+// (lab/016, lab/182).
+constexpr std::uint32_t kBlockSide = 128;
 
 struct NodePair {
   std::uint32_t a, b;

@@ -16,7 +16,7 @@ inline constexpr double kErrorPerLink = 7e-4;
 ///
 /// Each link is the least-squares fit of its pairs. The exchange of two nodes and, after scaling,
 /// the light that each patch gathers under uniform light are therefore those of the pairs. Dynamic
-/// programming, within blocks of 256 by 256 patches, compares all ways to cut the pairs into pairs
+/// programming, within blocks of 128 by 128 patches, compares all ways to cut the pairs into pairs
 /// of nodes by splitting either node again and again. It finds the way with the least squared error
 /// plus multiplier for each link: the Lagrangian form of "fewest links for a given error". The
 /// error is that of A^1/2 F A^-1/2 in the Frobenius norm. The multiplier is the square of
