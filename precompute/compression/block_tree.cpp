@@ -2,7 +2,6 @@
 
 #include <Eigen/QR>
 #include <algorithm>
-#include <array>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -71,7 +70,7 @@ class PieceCompressor {
     const auto rows = patches_of(tree_, tree_.clusters[row]),
                columns = patches_of(tree_, tree_.clusters[column]);
     if (matrix_.is_zero(rows, columns)) {
-      return zero_part(place_of(row, column), 0);
+      return zero_part(place_of(row, column), multiplier_ * sizes_.block);
     }
     if (!matrix_.has_parts() || !is_large(row, column)) {
       gather(row, column);
@@ -86,8 +85,8 @@ class PieceCompressor {
     }
     BlockPart best = compress_children(
         row, column, [&](std::uint32_t r, std::uint32_t c) { return compress(r, c); });
-    const double lost = multiplicity(row, column) * energy;
-    return cost_of_zero(lost) <= best.cost ? zero_part(place_of(row, column), lost) : best;
+    const double zero_cost = cost_of(row, column).total(energy, sizes_.block);
+    return zero_cost <= best.cost ? zero_part(place_of(row, column), zero_cost) : best;
   }
 
  private:
@@ -193,11 +192,12 @@ class PieceCompressor {
                                            BlockAttempt& attempt) const {
     const TransferBlock place = place_of(at.row, at.column);
     const CompressionCost cost = cost_of(at.row, at.column);
-    const double overhead = multiplier_ * sizes_.block, lost = cost.multiplicity * energy;
-    if (lost <= overhead) return zero_part(place, lost);
+    const double overhead = multiplier_ * sizes_.block;
+    const double zero_cost = cost.total(energy, sizes_.block);
+    if (zero_cost <= 2 * overhead) return zero_part(place, zero_cost);
     const Index smooth = std::min(block.rows(), block.columns()) / kSmoothPart;
     if (smooth == 0 || are_leaves(at.row, at.column)) return std::nullopt;
-    attempt = compress_block(block, cost, lost, smooth, seed_of(place));
+    attempt = compress_block(block, cost, zero_cost - overhead, smooth, seed_of(place));
     const bool is_smooth = attempt.block && attempt.block->row_basis.cols() < smooth &&
                            attempt.block->column_basis.cols() < smooth;
     if (!is_smooth) return std::nullopt;
@@ -218,7 +218,7 @@ class PieceCompressor {
     if (wanted_.is_mixed(row) || wanted_.is_mixed(column)) return children();
     const TransferBlock place = place_of(row, column);
     const double overhead = multiplier_ * sizes_.block;
-    if (is_zero(place)) return zero_part(place, 0);
+    if (is_zero(place)) return zero_part(place, overhead);
     const WideBlock block = weighted_block(place, row, column);
     const CompressionCost cost = cost_of(row, column);
     const double energy = block.entries.squaredNorm();
@@ -227,8 +227,8 @@ class PieceCompressor {
       return std::move(*part);
     }
     BlockPart best = are_leaves(row, column) ? dense_part(place) : children();
-    const double lost = cost.multiplicity * energy;
-    if (cost_of_zero(lost) <= best.cost) best = zero_part(place, lost);
+    const double zero_cost = cost.total(energy, sizes_.block);
+    if (zero_cost <= best.cost) best = zero_part(place, zero_cost);
     const double limit = best.cost - overhead;
     if (attempt.least_beyond < limit) {
       attempt = compress_block(block, cost, limit, block.rows(), seed_of(place));
@@ -258,17 +258,14 @@ class PieceCompressor {
     return part;
   }
 
-  double cost_of_zero(double lost) const { return lost + multiplier_ * sizes_.block; }
-
-  /// A block of zeros in place of entries with the squared norm `lost`, in all directions together.
-  BlockPart zero_part(TransferBlock place, double lost) const {
+  static BlockPart zero_part(TransferBlock place, double cost) {
     place.kind = TransferBlock::Kind::kLowRank;
-    return {{place}, {}, cost_of_zero(lost), lost};
+    return {{place}, {}, cost};
   }
 
   BlockPart dense_part(const TransferBlock& place) const {
     const WideBlock block = wide_block(place);
-    BlockPart part{{place}, {}};
+    BlockPart part{{place}, {}, 0};
     for (Index m = 0; m < block.matrix_count; ++m)
       append_rows(block.matrix(m).cast<float>(), part.values);
     part.cost = multiplier_ * (sizes_.block + static_cast<double>(part.values.size()));
@@ -306,13 +303,12 @@ class PieceCompressor {
     place.coupling_step = static_cast<float>(coupling_step(block, weights, cost));
     place.row_residual_rank = static_cast<std::uint32_t>(ranks.row);
     place.column_residual_rank = static_cast<std::uint32_t>(ranks.column);
-    BlockPart part{{place}, {}};
+    BlockPart part{{place}, {}, 0};
     append_columns(block.row_basis.cast<float>(), part.values);
     append_columns(block.column_basis.cast<float>(), part.values);
     for (const Eigen::MatrixXd& coupling : block.couplings)
       append_rows(coupling.cast<float>(), part.values);
     part.cost = cost.of(block) + multiplier_ * sizes_.block;
-    part.error_squared = cost.multiplicity * block.error_squared;
     return part;
   }
 
@@ -353,7 +349,6 @@ void BlockPart::append(const BlockPart& other) {
   blocks.insert(blocks.end(), other.blocks.begin(), other.blocks.end());
   values.insert(values.end(), other.values.begin(), other.values.end());
   cost += other.cost;
-  error_squared += other.error_squared;
 }
 
 BlockPart joined(std::vector<BlockPart> parts) {
@@ -381,17 +376,17 @@ void share(const Ranks& ranks, std::span<BlockPart> parts) {
   if (ranks.alone()) return;
   std::vector<std::vector<TransferBlock>> blocks;
   std::vector<std::vector<float>> values;
-  std::vector<std::array<double, 2>> costs;
+  std::vector<double> costs;
   for (BlockPart& part : parts) {
     blocks.push_back(std::move(part.blocks));
     values.push_back(std::move(part.values));
-    costs.push_back({part.cost, part.error_squared});
+    costs.push_back(part.cost);
   }
   ranks.share(std::span(blocks));
   ranks.share(std::span(values));
   ranks.share(std::span(costs));
   for (std::size_t k = 0; k < parts.size(); ++k) {
-    parts[k] = {std::move(blocks[k]), std::move(values[k]), costs[k][0], costs[k][1]};
+    parts[k] = {std::move(blocks[k]), std::move(values[k]), costs[k]};
   }
 }
 

@@ -25,7 +25,6 @@ struct BlockPart {
   std::vector<TransferBlock> blocks;
   std::vector<float> values;
   double cost = 0;
-  double error_squared = 0;  ///< the part of the cost that is error
 
   void append(const BlockPart& other);
 };

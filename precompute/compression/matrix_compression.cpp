@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 #include <utility>
 
@@ -33,12 +32,6 @@ constexpr double kUniformShare = 0.1;
 // usual energy of all training lights at a position, by 2^kFinest at most (lab/136).
 constexpr double kConcentrated = 16;
 constexpr int kFinest = 8;
-
-// Pieces of a sample: their largest side as a part of all positions, within limits, the part of
-// them that is looked at, and the least number of them.
-constexpr std::uint32_t kSampledSide = 32, kLeastSampledSide = 256;
-constexpr double kSampledPart = 0.125;
-constexpr std::size_t kLeastSampled = 48;
 
 using Lights = std::vector<std::vector<Float3>>;
 
@@ -74,19 +67,6 @@ std::vector<std::int8_t> by_patch(const std::vector<std::int8_t>& at_position,
   std::vector<std::int8_t> of_patch(at_position.size());
   for (std::size_t k = 0; k < at_position.size(); ++k) of_patch[tree.patch[k]] = at_position[k];
   return of_patch;
-}
-
-/// Pieces spread evenly over the lower triangle (multiples of the golden ratio, R. Schretter,
-/// L. Kobbelt and P.-O. Dehaye, "Golden ratio sequences for low-discrepancy sampling", 2012).
-std::vector<BlockPiece> sampled(std::span<const BlockPiece> pieces) {
-  const double part = std::max(
-      kSampledPart, static_cast<double>(kLeastSampled) / static_cast<double>(pieces.size()));
-  std::vector<BlockPiece> sample;
-  for (std::size_t k = 0; k < pieces.size(); ++k) {
-    const double place = static_cast<double>(k) * std::numbers::phi;
-    if (place - std::floor(place) < part) sample.push_back(pieces[k]);
-  }
-  return sample;
 }
 
 }  // namespace
@@ -133,7 +113,8 @@ MatrixCompression::MatrixCompression(const SymmetricMatrix& matrix, const PatchT
 HierarchicalStorage MatrixCompression::at(double multiplier, const KeptParts& kept,
                                           const Progress& progress) const {
   const std::vector<ClusterWeight> weights = frame_.weights();
-  const BlockTreeCompressor compressor(matrix(), frame_.tree, weights, sizes_);
+  const BlockTreeCompressor compressor(equilibrated_ ? *equilibrated_ : matrix_, frame_.tree,
+                                       weights, sizes_);
   const std::vector<BlockPiece> pieces = compressor.pieces();
   const std::size_t together = kept.checkpoint.keeps() ? kKeptPieces : pieces.size();
   const auto all = static_cast<double>(pieces.size());
@@ -155,21 +136,6 @@ HierarchicalStorage MatrixCompression::at(double multiplier, const KeptParts& ke
   }
   storage.scale_exponent = exponent_;
   return storage;
-}
-
-OperatorSample MatrixCompression::sample(double multiplier, const Progress& progress) const {
-  const std::vector<ClusterWeight> weights = frame_.weights();
-  const BlockTreeCompressor compressor(matrix(), frame_.tree, weights, sizes_);
-  const std::uint32_t positions = frame_.tree.clusters.front().count;
-  const std::uint32_t side =
-      std::clamp(positions / kSampledSide, kLeastSampledSide, largest_piece(positions));
-  const std::vector<BlockPiece> pieces = block_pieces(frame_.tree, side), some = sampled(pieces);
-  const BlockPart part = compressor.compress(some, multiplier, progress);
-  const double times = static_cast<double>(pieces.size()) / static_cast<double>(some.size());
-  const double size = static_cast<double>(part.values.size()) +
-                      sizes_.block * static_cast<double>(part.blocks.size());
-  const double squared = times * part.error_squared / static_cast<double>(frame_.tree.patch.size());
-  return {.error = std::sqrt(squared) / frame_.received_part, .size = std::max(1.0, times * size)};
 }
 
 void MatrixCompression::emphasise(const TransferOperator& transfer) {

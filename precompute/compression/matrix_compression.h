@@ -59,12 +59,6 @@ struct KeptParts {
   std::string prefix;
 };
 
-/// What a sample of the pieces of an operator says of all of it.
-struct OperatorSample {
-  double error = 0;  ///< about the root mean square of the relative errors of lights
-  double size = 0;   ///< > 0, in values; PartSizes::block for each block
-};
-
 /// A compressor of one matrix with all that it looks at.
 class MatrixCompression {
  public:
@@ -78,10 +72,6 @@ class MatrixCompression {
   HierarchicalStorage at(double multiplier, const KeptParts& kept,
                          const Progress& progress = {}) const;
 
-  /// What an eighth of the operator at a multiplier > 0 says of it, in smaller pieces than those of
-  /// at(). Throws Cancelled if asked to stop.
-  OperatorSample sample(double multiplier, const Progress& progress = {}) const;
-
   /// CompressionFrame::multiplier_for.
   double multiplier_for(double usual) const { return frame_.multiplier_for(usual); }
 
@@ -93,9 +83,6 @@ class MatrixCompression {
   void add_training_light(const ReferenceLighting& lights, std::size_t k);
 
  private:
-  /// The matrix whose entries are compressed.
-  const SymmetricMatrix& matrix() const { return equilibrated_ ? *equilibrated_ : matrix_; }
-
   /// Makes K larger at positions where the last training light has much of its energy.
   void round_finer_where_lit();
 

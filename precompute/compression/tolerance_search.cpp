@@ -25,35 +25,24 @@ constexpr int kMostRounds = 8;
 constexpr double kAim = 0.76, kMost = 0.8;
 
 // The usual number of rounds of the search.
-constexpr int kUsualRounds = 2;  // lab/182
-
-// The part of the progress of a search that its samples take.
-constexpr double kSamplesPart = 0.1;
+constexpr int kUsualRounds = 3;  // lab/181
 
 // The multiplier at which the search begins, in units of the squared tolerance over the number of
 // patches (lab/037).
 constexpr double kInitialMultiplier = 2.5;
 
-// Searches end at 0.7 to 57 times that (lab/037, lab/181).
-constexpr double kUsualMultiple = 5;
+// Operators with cluster bases mostly end far above that. Above kStartPatches patches, their search
+// begins higher by this power of the ratio of patch counts, up to a limit (lab/037, lab/181).
+constexpr double kStartPatches = 1000, kStartGrowth = 1.5, kHighestStart = 13;
 
-// Samples look for the first multiplier of a search: at most that many, up to that multiple of the
-// wanted error, and as long as a further one is expected to save that fraction of the size.
-constexpr int kMostTrials = 4;
-constexpr double kMostSampledError = 1.2, kLeastSampledSaving = 0.1;
-
-/// What is known of searches for one kind of operators.
-struct SearchKind {
-  MultiplierSearch::Expected expected;
-  double error_over_sampled;  ///< the error of lights over what samples tell
-};
+// Operators without cluster bases, form factors, usually end at 2.5 to 22 times it (lab/037).
+constexpr double kPlainStart = 2;
 
 // How errors grow with the multiplier (lab/181), and the least fraction of the size that a further
-// round is expected to save (lab/037). A round of form factors, which have no cluster bases, takes
-// as long as a tenth of the solves that they are made for (lab/180). Errors over those of samples
-// are means of some scenes (lab/182).
-constexpr SearchKind kNestedSearch{{.slope = 0.35, .least_saving = 0.03}, 1.2},
-    kPlainSearch{{.slope = 0.5, .least_saving = 0.08}, 2};
+// round is expected to save (lab/037). A round of form factors takes as long as a tenth of the
+// solves that they are made for (lab/180).
+constexpr MultiplierSearch::Expected kExpected{.slope = 0.35, .least_saving = 0.03},
+    kPlainExpected{.slope = 0.5, .least_saving = 0.08};
 
 // The time of a vector and of a block in a product, beside their values, in units of a value. It
 // counts in full in operators of kSizedPatches patches and in part in smaller ones: coefficients
@@ -155,20 +144,12 @@ class WorstLights {
   std::size_t count_ = 0;
 };
 
-/// The multiplier at which operators have the error `aim`, as far as samples of them tell.
-double sampled_multiplier(const MatrixCompression& compression, double usual, double aim,
-                          const SearchKind& kind, const Progress& progress) {
-  const double wanted = aim / kind.error_over_sampled;
-  MultiplierSearch search(compression.multiplier_for(kUsualMultiple * usual),
-                          {wanted, kMostSampledError * wanted},
-                          {kind.expected.slope, kLeastSampledSaving});
-  for (int k = 0; k < kMostTrials && !search.done(); ++k) {
-    constexpr double kEach = 1.0 / kMostTrials;
-    const OperatorSample sample =
-        compression.sample(search.multiplier(), part_of(progress, k * kEach, (k + 1) * kEach));
-    search.report(sample.error, sample.size);
-  }
-  return search.multiplier();
+/// The multiplier at which a search begins.
+double search_start(const HierarchicalSettings& settings, std::size_t patch_count) {
+  const double usual = initial_multiplier(settings.tolerance, patch_count);
+  if (!settings.cluster_bases) return kPlainStart * usual;
+  const double times = static_cast<double>(patch_count) / kStartPatches;
+  return usual * std::clamp(std::pow(times, kStartGrowth), 1.0, kHighestStart);
 }
 
 }  // namespace
@@ -187,16 +168,13 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
                                 part_sizes(settings, patches.size()), options_of(settings));
   report_progress(progress, 0);
   const double tolerance = settings.tolerance;
-  const SearchKind& kind = settings.cluster_bases ? kNestedSearch : kPlainSearch;
-  MultiplierSearch search(
-      sampled_multiplier(compression, initial_multiplier(tolerance, patches.size()),
-                         kAim * tolerance, kind, part_of(progress, 0, kSamplesPart)),
-      {kAim * tolerance, kMost * tolerance}, kind.expected);
-  const Progress rounds = part_of(progress, kSamplesPart, 1);
+  MultiplierSearch search(compression.multiplier_for(search_start(settings, patches.size())),
+                          {kAim * tolerance, kMost * tolerance},
+                          settings.cluster_bases ? kExpected : kPlainExpected);
   Best best(kMost * tolerance);
   WorstLights worst(kMost * kLargestOverMean * tolerance);
   for (int round = 0; round < kMostRounds && !search.done(); ++round) {
-    const Progress part = part_of(rounds, part_of_search(round), part_of_search(round + 1));
+    const Progress part = part_of(progress, part_of_search(round), part_of_search(round + 1));
     const KeptParts kept{checkpoint, fmt::format("round_{}", round)};
     return_freed_memory();  // of lights that are kept otherwise now, and of the round before
     const auto candidate = std::make_shared<const HierarchicalOperator>(

@@ -8,14 +8,12 @@
 #include <atomic>
 #include <cmath>
 #include <cstdio>
-#include <numeric>
 #include <optional>
 #include <random>
 #include <span>
 #include <vector>
 
 #include "precompute/inverse/hierarchical_matrix.h"
-#include "tests/precompute/compression/kernel_box.h"
 #include "tests/support/solved_room.h"
 #include "tests/support/unshadowed_lights.h"
 #include "transfer/format/hierarchical_encoding.h"
@@ -216,62 +214,6 @@ TEST(MatrixCompression, LargeBlocksOfPartsAreCompressedWithoutBeingRead) {
     const auto truth = product(whole, light);
     EXPECT_LT(relative_difference(product(of_entries, light), truth, patches.area), 1e-3);
     EXPECT_LT(relative_difference(product(of_parts, light), truth, patches.area), 1e-3);
-  }
-}
-
-/// The weights of clusters under which all errors count alike.
-std::vector<ClusterWeight> even_weights(const ClusterTree& tree) {
-  std::vector<ClusterWeight> weights;
-  for (const Cluster& cluster : tree.clusters) {
-    const Eigen::Index count = cluster.count;
-    weights.emplace_back(Eigen::VectorXd::Ones(count), Eigen::MatrixXd(count, 0),
-                         Eigen::VectorXd(0));
-  }
-  return weights;
-}
-
-TEST(BlockTreeCompressor, APartSaysItsSquaredError) {
-  const PatchTable patches = test::kernel_box(16);
-  const test::KernelMatrix matrix(patches);
-  const CompressionFrame frame =
-      compression_frame(matrix, patches, test::soft_spots(patches, 4, 1));
-  const std::vector<ClusterWeight> weights = even_weights(frame.tree);
-  const BlockTreeCompressor compressor(matrix, frame.tree, weights);
-  std::vector<std::uint32_t> all(patches.size());
-  std::iota(all.begin(), all.end(), 0U);
-  const Eigen::MatrixXf exact = matrix.all_entries(all, all).front();
-  for (const double multiplier : {1e-9, 1e-7}) {
-    BlockPart part = compressor.compress(compressor.pieces(), multiplier);
-    const double said = part.error_squared;
-    const HierarchicalOperator compressed(compressor.assemble(std::move(part)));
-    const Eigen::MatrixXf found =
-        HierarchicalMatrix(compressed.storage()).all_entries(all, all).front();
-    const double error = (found - exact).cast<double>().squaredNorm();
-    std::printf("squared error %.4g of %.4g, said %.4g\n", error,
-                exact.cast<double>().squaredNorm(), said);
-    EXPECT_GT(error, 0);
-    EXPECT_NEAR(said / error, 1, 0.01);
-  }
-}
-
-TEST(MatrixCompression, ASampleOfPiecesTellsErrorAndSizeOfAll) {
-  const PatchTable patches = test::kernel_box(24);
-  const test::KernelMatrix matrix(patches);
-  const MatrixCompression compression(matrix, patches, test::soft_spots(patches, 24, 1));
-  const auto lights = test::soft_spots(patches, 24, 2);
-  const ReferenceLighting truth(matrix, lights);
-  for (const double multiplier : {3e-9, 1e-7}) {
-    const OperatorSample sample = compression.sample(multiplier);
-    const HierarchicalStorage whole = compression.at(multiplier, {BlockCheckpoint(), {}});
-    const double size = static_cast<double>(whole.values_f32.size()) +
-                        PartSizes{}.block * static_cast<double>(whole.blocks.size());
-    double error = 0;
-    for (const double e : truth.errors(HierarchicalOperator(whole))) error += e / 24;
-    std::printf("size %.4g, sampled %.4g; error %.4g, sampled %.4g\n", size, sample.size, error,
-                sample.error);
-    EXPECT_NEAR(sample.size / size, 1, 0.15);
-    EXPECT_GT(sample.error, error / 3);
-    EXPECT_LT(sample.error, 1.5 * error);
   }
 }
 
