@@ -181,7 +181,11 @@ class LinkedOperator {
                             .roles = roles_,
                             .tolerance = tolerance()};
     MatrixFreeTransferSettings settings;
-    settings.compression = {tolerance(), *decided_.precision};
+    // Links and compression share the tolerance of the mean. What single lamps may err by is for
+    // compression alone, as in the check.
+    settings.compression = {.tolerance = tolerance(),
+                            .precision = *decided_.precision,
+                            .largest_over_mean = kLargestOverMean / kCompressionPart};
     settings.roles = roles_;
     settings.group = std::move(group_);
     settings.memory_limit_bytes =

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "precompute/lights/validation_error.h"
 #include "rebounce/build_settings.h"
 
 namespace rebounce {
@@ -15,6 +16,8 @@ struct HierarchicalSettings {
   /// support them. Patches are equilibrated (HierarchicalOperator) with cluster bases and wherever
   /// bases are integers.
   bool cluster_bases = true;
+  /// The largest error of single lights may be this multiple of the tolerance.
+  double largest_over_mean = kLargestOverMean;
 };
 
 }  // namespace rebounce

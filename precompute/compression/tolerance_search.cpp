@@ -172,7 +172,7 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
                           {kAim * tolerance, kMost * tolerance},
                           settings.cluster_bases ? kExpected : kPlainExpected);
   Best best(kMost * tolerance);
-  WorstLights worst(kMost * kLargestOverMean * tolerance);
+  WorstLights worst(kMost * settings.largest_over_mean * tolerance);
   for (int round = 0; round < kMostRounds && !search.done(); ++round) {
     const Progress part = part_of(progress, part_of_search(round), part_of_search(round + 1));
     const KeptParts kept{checkpoint, fmt::format("round_{}", round)};
@@ -180,7 +180,7 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
     const auto candidate = std::make_shared<const HierarchicalOperator>(
         encode_values(compression.at(search.multiplier(), kept, part), settings.precision));
     const std::vector<double> errors = validation.errors(*candidate);
-    const double error = validation_error(errors);
+    const double error = validation_error(errors, settings.largest_over_mean);
     best.offer(candidate, error);
     search.report(error, static_cast<double>(candidate->bytes()));
     if (search.done()) break;

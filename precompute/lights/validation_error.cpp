@@ -33,13 +33,13 @@ double largest_of_group(std::span<const double> falling) {
 
 }  // namespace
 
-double validation_error(std::span<const double> errors) {
+double validation_error(std::span<const double> errors, double largest_over_mean) {
   std::vector<double> falling(errors.begin(), errors.end());
   std::ranges::sort(falling, std::greater<>());
   const double mean =
       std::accumulate(falling.begin(), falling.end(), 0.0) / static_cast<double>(falling.size());
-  return std::max({mean, largest_of_group(falling) / kLargestOverMean,
-                   kSeenPart * falling.front() / kLargestOverMean});
+  const double largest = std::max(largest_of_group(falling), kSeenPart * falling.front());
+  return std::max(mean, largest / largest_over_mean);
 }
 
 }  // namespace rebounce

@@ -19,14 +19,14 @@ std::vector<double> errors(std::size_t count, double usual, const std::vector<do
 }
 
 TEST(ValidationError, IsTheMeanOrAThirdOfTheLargestOfAFewLights) {
-  EXPECT_NEAR(validation_error(errors(12, 0.004, {})), 0.004, 1e-12);
-  EXPECT_NEAR(validation_error(errors(12, 0.004, {0.03})), 0.01, 1e-12);
-  EXPECT_NEAR(validation_error(errors(1, 0.004, {})), 0.004, 1e-12);
+  EXPECT_NEAR(validation_error(errors(12, 0.004, {}), 3), 0.004, 1e-12);
+  EXPECT_NEAR(validation_error(errors(12, 0.004, {0.03}), 3), 0.01, 1e-12);
+  EXPECT_NEAR(validation_error(errors(1, 0.004, {}), 3), 0.004, 1e-12);
 }
 
 TEST(ValidationError, IsTheMeanWhereAllErrorsAreAlike) {
   for (const std::size_t count : {32, 64, 256, 1000}) {
-    EXPECT_NEAR(validation_error(errors(count, 0.004, {})), 0.004, 1e-12);
+    EXPECT_NEAR(validation_error(errors(count, 0.004, {}), 3), 0.004, 1e-12);
   }
 }
 
@@ -40,22 +40,22 @@ TEST(ValidationError, FindsWhatTheLargestOf64LightsIsOfAnExponentialTail) {
     for (int sample = 0; sample < kSamples; ++sample) {
       std::vector<double> drawn(count);
       for (double& e : drawn) e = error(engine);
-      sum += validation_error(drawn);
+      sum += validation_error(drawn, 3);
     }
     EXPECT_NEAR(sum / kSamples, 7.13 * 0.003 / 3, 0.08 * 7.13 * 0.003 / 3) << count << " lights";
   }
 }
 
 TEST(ValidationError, SeesASingleLightThatTheTailDoesNot) {
-  EXPECT_NEAR(validation_error(errors(512, 0.0009, {0.032})), 0.8 * 0.032 / 3, 1e-12);
+  EXPECT_NEAR(validation_error(errors(512, 0.0009, {0.032}), 3), 0.8 * 0.032 / 3, 1e-12);
 }
 
 TEST(ValidationError, DoesNotDependOnTheOrder) {
   std::vector<double> many = errors(256, 0.003, {0.022, 0.03, 0.04, 0.05});
-  const double judged = validation_error(many);
+  const double judged = validation_error(many, 3);
   EXPECT_GT(judged, 0.004);
   std::ranges::reverse(many);
-  EXPECT_EQ(validation_error(many), judged);
+  EXPECT_EQ(validation_error(many, 3), judged);
 }
 
 }  // namespace
