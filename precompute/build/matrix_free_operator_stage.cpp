@@ -30,6 +30,9 @@ constexpr std::size_t kFormFactorValidationCount = 64;
 // does not matter.
 constexpr double kFittingResidual = 1e-2;
 
+// What form factors err by under single lamps is a part of what the operator errs by (lab/183).
+constexpr double kLargestOverMeanOfFormFactors = 6;
+
 // How far the truth of a check may be off, in parts of the error that it tells (lab/149).
 constexpr double kTruthPart = 0.02;
 
@@ -167,7 +170,10 @@ class LinkedOperator {
         clock_.run("form factor compression", [&](const Progress& part) {
           return compress_form_factors(links_, data_.patches, group_,
                                        std::move(lights_.radiosities),
-                                       {report_.form_factor_tolerance, Precision::kF16}, part);
+                                       {.tolerance = report_.form_factor_tolerance,
+                                        .precision = Precision::kF16,
+                                        .largest_over_mean = kLargestOverMeanOfFormFactors},
+                                       part);
         });
     report_.form_factor_error = form_factor_error(*data_.compressed_form_factors, *links_,
                                                   data_.patches, lights_.test_radiosities);

@@ -23,7 +23,7 @@ namespace rebounce {
 
 /// The tolerance of the operator over that of the compressed form factors that it is made from.
 /// Their error adds to its own.
-inline constexpr double kToleranceOverFormFactors = 5;  // lab/060
+inline constexpr double kToleranceOverFormFactors = 2.5;  // lab/183
 
 /// Lower limit of the tolerance of form factors in half precision, whose rounding error is not far
 /// below.

@@ -185,7 +185,7 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
     search.report(error, static_cast<double>(candidate->bytes()));
     if (search.done()) break;
     worst.join(validation, errors, compression);
-    compression.emphasise(*candidate);
+    if (round == 0) compression.emphasise(*candidate);
   }
   return best.take();
 }
