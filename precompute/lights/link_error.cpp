@@ -15,8 +15,8 @@ namespace {
 
 // The lights and the part of the rays that decide whether links are near enough, and how far these
 // lights may be off: that counts as an error of the links.
-constexpr int kJudgingLights = 32;
-constexpr double kJudgingRays = 0.25, kJudgingResidual = 1e-4;
+constexpr int kJudgingLights = 64;
+constexpr double kJudgingRays = 0.5, kJudgingResidual = 1e-4;
 
 // The residual that fewer links solve to: what they are off by themselves (lab/015).
 constexpr double kFewerResidual = 1e-3;
