@@ -12,8 +12,8 @@
 
 namespace rebounce {
 
-/// What the light of `links` is off by under a few point lights, for a decision: an eighth of
-/// the lights and a quarter of the rays of the check. `fewer` are chosen again from these links
+/// What the light of `links` is off by under a few point lights, for a decision: a quarter
+/// of the lights and half of the rays of the check. `fewer` are chosen again from these links
 /// (fit_links): light is solved for along them, and corrected by the links. Memory and other
 /// arguments are those of WholeErrorEstimator. Throws Cancelled if asked to stop.
 SampledError error_of_links(const std::shared_ptr<const LinkedFormFactors>& links,

@@ -121,7 +121,7 @@ TEST_F(PrecomputeCommand, LinksHaveNoFormFactorsOfPairs) {
   const json info = summary_of({"info", file});
   EXPECT_EQ(info["form_factors"], "none");
   EXPECT_EQ(info["compressed_form_factor_bytes"], 0);
-  EXPECT_EQ(info["settings"]["form_factor_tolerance"], tolerance / 5);
+  EXPECT_EQ(info["settings"]["form_factor_tolerance"], tolerance / 2.5);
   EXPECT_LE(info["error_mean"].get<double>(), tolerance);
 }
 
