@@ -38,7 +38,8 @@ std::string identity_of_rounds(const std::string& couplings,
                                const HierarchicalSettings& settings) {
   Identity identity;
   identity.add(couplings, std::string_view(precision_name(settings.precision)),
-               std::array{settings.tolerance, settings.largest_over_mean}, std::array{settings.cluster_bases});
+               std::array{settings.tolerance, settings.largest_over_mean},
+               std::array{settings.cluster_bases});
   for (const std::vector<Float3>& light : validation) identity.add(light);
   return identity.text();
 }
