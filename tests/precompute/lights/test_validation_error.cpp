@@ -50,6 +50,12 @@ TEST(ValidationError, SeesASingleLightThatTheTailDoesNot) {
   EXPECT_NEAR(validation_error(errors(512, 0.0009, {0.032}), 3), 0.8 * 0.032 / 3, 1e-12);
 }
 
+TEST(ValidationError, AllowsTheLargestMoreAndTheMeanTheSame) {
+  EXPECT_NEAR(validation_error(errors(12, 0.004, {0.03}), 4), 0.0075, 1e-12);
+  EXPECT_NEAR(validation_error(errors(512, 0.0009, {0.032}), 4), 0.8 * 0.032 / 4, 1e-12);
+  EXPECT_NEAR(validation_error(errors(512, 0.004, {0.006}), 100), 0.004, 1e-5);
+}
+
 TEST(ValidationError, DoesNotDependOnTheOrder) {
   std::vector<double> many = errors(256, 0.003, {0.022, 0.03, 0.04, 0.05});
   const double judged = validation_error(many, 3);
