@@ -20,7 +20,7 @@ constexpr std::uint32_t kLeafSize = 32;  // lab/050: 64 take more bytes, 16 twic
 // enough for many threads to share.
 constexpr std::size_t kKeptPieces = 64;
 
-// From one round to the next, the strength of a training light changes by a factor between these
+// When training lights are emphasised, the strength of each changes by a factor between these
 // (lab/047).
 constexpr double kLeastEmphasis = 0.5, kMostEmphasis = 4;
 

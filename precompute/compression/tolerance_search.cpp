@@ -185,6 +185,7 @@ std::shared_ptr<const HierarchicalOperator> compress_to_tolerance(
     search.report(error, static_cast<double>(candidate->bytes()));
     if (search.done()) break;
     worst.join(validation, errors, compression);
+    // To emphasise again raises the mean error, so that the search may not end (lab/183).
     if (round == 0) compression.emphasise(*candidate);
   }
   return best.take();
