@@ -112,9 +112,9 @@ std::string better_blas_kernels(std::string_view chosen, const ProcessorFeatures
 
 }  // namespace rebounce
 
-// The Fortran functions that Eigen calls with EIGEN_USE_BLAS, in single and double precision.
-// Fortran passes addresses only. The symbols are hidden, so that a shared library does not export
-// them.
+// The Fortran functions that Eigen calls with EIGEN_USE_BLAS, in single and double precision, and
+// one of LAPACK. Fortran passes addresses only. The symbols are hidden, so that a shared library
+// does not export them.
 using P = const void*;
 #define REBOUNCE_FORWARD_AS(name, parameters, ...)                                   \
   extern "C" __attribute__((visibility("hidden"))) void name parameters {            \
@@ -141,3 +141,5 @@ REBOUNCE_FORWARD(trmm, (P a, P b, P c, P d, P e, P f, P g, P h, P i, P j, P k), 
                  h, i, j, k)
 REBOUNCE_FORWARD(trsm, (P a, P b, P c, P d, P e, P f, P g, P h, P i, P j, P k), a, b, c, d, e, f, g,
                  h, i, j, k)
+REBOUNCE_FORWARD_AS(dsyevd_, (P a, P b, P c, P d, P e, P f, P g, P h, P i, P j, P k), a, b, c, d, e,
+                    f, g, h, i, j, k)

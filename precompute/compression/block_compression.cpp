@@ -1,11 +1,11 @@
 #include "precompute/compression/block_compression.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
+#include "precompute/base/eigenvectors.h"
 #include "precompute/base/orthonormal_columns.h"
 #include "precompute/base/random_signs.h"
 
@@ -32,11 +32,11 @@ struct Spectrum {
   std::vector<double> missing;  ///< [k] energy of the whole minus that of the first k
 };
 
-/// Makes a spectrum from eigenvectors in ascending order.
-Spectrum descending(const MatrixXd& vectors, const Eigen::VectorXd& energies) {
+Spectrum descending(const Eigenvectors& ascending) {
   Spectrum spectrum;
+  const Eigen::VectorXd& energies = ascending.values;
   const Index count = energies.size();
-  spectrum.directions = vectors.rowwise().reverse();
+  spectrum.directions = ascending.vectors.rowwise().reverse();
   spectrum.missing.assign(static_cast<std::size_t>(count) + 1, 0);
   for (Index k = count; k-- > 0;) {
     spectrum.missing[k] = spectrum.missing[k + 1] + std::max(0.0, energies[count - 1 - k]);
@@ -47,8 +47,7 @@ Spectrum descending(const MatrixXd& vectors, const Eigen::VectorXd& energies) {
 Spectrum gram_spectrum(const MatrixXd& a) {
   MatrixXd gram = MatrixXd::Zero(a.rows(), a.rows());
   gram.selfadjointView<Eigen::Lower>().rankUpdate(a);
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(gram);
-  return descending(solver.eigenvectors(), solver.eigenvalues());
+  return descending(eigenvectors(gram));
 }
 
 /// What the choice of ranks needs to know of a block.

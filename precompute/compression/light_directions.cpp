@@ -1,9 +1,10 @@
 #include "precompute/compression/light_directions.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+
+#include "precompute/base/eigenvectors.h"
 
 namespace rebounce {
 namespace {
@@ -25,8 +26,7 @@ MatrixXd directions_of(const MatrixXd& light) {
   if (light.rows() == 0) return {};
   MatrixXd gram = MatrixXd::Zero(light.rows(), light.rows());
   gram.selfadjointView<Eigen::Lower>().rankUpdate(light);
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(gram);
-  return solver.eigenvectors().rowwise().reverse();
+  return eigenvectors(gram).vectors.rowwise().reverse();
 }
 
 /// The directions of `light`, after the orthonormal ones of `kept`. They are found in a basis of

@@ -1,11 +1,11 @@
 #include "precompute/compression/light_weights.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "precompute/base/blas.h"
+#include "precompute/base/eigenvectors.h"
 #include "precompute/base/parallel_loop.h"
 
 namespace rebounce {
@@ -37,11 +37,11 @@ Principal principal_directions(const MatrixXd& sample) {
   const bool tall = sample.rows() > sample.cols();
   const MatrixXd gram =
       tall ? MatrixXd(sample.transpose() * sample) : MatrixXd(sample * sample.transpose());
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(gram);
+  const Eigenvectors found = eigenvectors(gram);
   const Index count = std::min(kDirectionCount, gram.rows());
   Principal result;
-  result.energies = solver.eigenvalues().tail(count).cwiseMax(0);
-  const auto vectors = solver.eigenvectors().rightCols(count);
+  result.energies = found.values.tail(count).cwiseMax(0);
+  const auto vectors = found.vectors.rightCols(count);
   if (!tall) {
     result.directions = vectors;
     return result;

@@ -1,11 +1,11 @@
 #include "precompute/compression/low_rank_transfer.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <numeric>
 #include <random>
 
 #include "precompute/base/blas.h"
+#include "precompute/base/eigenvectors.h"
 #include "precompute/base/orthonormal_columns.h"
 #include "precompute/base/symmetric_matrix.h"
 #include "rebounce/error.h"
@@ -59,8 +59,8 @@ RitzVectors ritz_vectors(const DenseMatrix& dense, const MatrixXf& basis, Index 
     const MatrixXd image = result.images.back().cast<double>();
     gram += image.transpose() * image;
   }
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(gram);
-  const MatrixXf leading = solver.eigenvectors().rightCols(rank).rowwise().reverse().cast<float>();
+  const MatrixXf leading =
+      eigenvectors(gram).vectors.rightCols(rank).rowwise().reverse().cast<float>();
   result.basis = basis * leading;
   for (MatrixXf& image : result.images) image = image * leading;
   return result;

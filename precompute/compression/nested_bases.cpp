@@ -1,6 +1,5 @@
 #include "precompute/compression/nested_bases.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -8,6 +7,7 @@
 #include <utility>
 
 #include "precompute/base/blas.h"
+#include "precompute/base/eigenvectors.h"
 #include "precompute/base/parallel_loop.h"
 #include "precompute/compression/residual_ranks.h"
 
@@ -231,9 +231,9 @@ class Nesting {
       const MatrixXd part = weighted_part(ends_[e], c);
       gram.noalias() += ends_[e].multiplicity * (part * ends_[e].weighted) * part.transpose();
     }
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(gram);
-    own.directions = solver.eigenvectors().rowwise().reverse();
-    own.energies = solver.eigenvalues().reverse().cwiseMax(0);
+    const Eigenvectors found = eigenvectors(gram);
+    own.directions = found.vectors.rowwise().reverse();
+    own.energies = found.values.reverse().cwiseMax(0);
     const double worth = multiplier() * frame_.cost.size(size + own.stacked, 1, 0);
     own.rank = (own.energies.array() > worth).count();
   }

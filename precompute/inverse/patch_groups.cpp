@@ -1,6 +1,5 @@
 #include "precompute/inverse/patch_groups.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <Eigen/SVD>
 #include <algorithm>
@@ -9,6 +8,7 @@
 #include <numeric>
 #include <utility>
 
+#include "precompute/base/eigenvectors.h"
 #include "precompute/base/orthonormal_columns.h"
 #include "precompute/base/random_signs.h"
 
@@ -62,15 +62,15 @@ MatrixXd lasting_light(const SymmetricMatrix& form_factors, const Progress& prog
   MatrixXd x = random_signs(static_cast<std::uint32_t>(n),
                             static_cast<std::uint32_t>(std::min(n, kMostPatchGroups)), kSeed)
                    .cast<double>();
-  x = orthonormal_columns(x);
+  x = orthonormal_columns_of_tall(x);
   for (int step = 0; step < kSubspaceSteps; ++step) {
     report_progress(progress, step / (kSubspaceSteps + 1.0));
-    x = orthonormal_columns(exchange.times(x));
+    x = orthonormal_columns_of_tall(exchange.times(x));
   }
   const MatrixXd projected = x.transpose() * exchange.times(x);
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(0.5 * (projected + projected.transpose()));
-  const Index lasting = (solver.eigenvalues().array() > kStays).count();
-  return x * solver.eigenvectors().rightCols(lasting);
+  const Eigenvectors found = eigenvectors(0.5 * (projected + projected.transpose()));
+  const Index lasting = (found.values.array() > kStays).count();
+  return x * found.vectors.rightCols(lasting);
 }
 
 /// The group of each patch by eigenvectors, [n]: those of the patches that pivots of the QR

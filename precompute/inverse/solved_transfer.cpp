@@ -134,7 +134,7 @@ SolvedTransfer::Leading SolvedTransfer::find_leading(const Eigen::VectorXf& root
     leading.vectors = Vectors::NullaryExpr(position_count(), count, [&] { return sign(engine); });
   }
   for (int step = other == nullptr ? 0 : kLeadingSteps - kFurtherSteps;; ++step) {
-    leading.vectors = orthonormal_columns(MatrixXf(root.asDiagonal() * leading.vectors));
+    leading.vectors = orthonormal_columns_of_tall(MatrixXf(root.asDiagonal() * leading.vectors));
     const bool last = step == kLeadingSteps;
     leading.gathered =
         gather_all(last ? form_factors_ : of_steps(), root.asDiagonal() * leading.vectors);
