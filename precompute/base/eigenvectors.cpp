@@ -31,6 +31,7 @@ bool divide_and_conquer(const Eigen::MatrixXd& matrix, Eigenvectors& found) {
 }  // namespace
 
 Eigenvectors eigenvectors(const Eigen::MatrixXd& matrix) {
+  if (matrix.rows() == 0) return {};
   Eigenvectors found;
   const bool divides = matrix.rows() >= kLeastDivided && matrix.rows() <= kMostDivided;
   if (divides && divide_and_conquer(matrix, found)) return found;
