@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 
+// NOLINTNEXTLINE(readability-identifier-naming): the name is LAPACK's
 extern "C" void dsyevd_(const void* job, const void* triangle, const void* rows, const void* matrix,
                         const void* stride, const void* values, const void* work,
                         const void* work_size, const void* integer_work,

@@ -29,8 +29,9 @@ MatrixXd steep_columns(double least) {
 
 template <typename Matrix>
 double beside_orthonormal(const Matrix& columns) {
-  const MatrixXd wide = columns.template cast<double>();
-  return (wide.transpose() * wide - MatrixXd::Identity(wide.cols(), wide.cols())).norm();
+  const MatrixXd products =
+      columns.template cast<double>().transpose() * columns.template cast<double>();
+  return (products - MatrixXd::Identity(products.rows(), products.cols())).norm();
 }
 
 /// What a basis misses of a matrix.
