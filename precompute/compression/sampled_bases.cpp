@@ -12,6 +12,7 @@
 #include "precompute/base/parallel_loop.h"
 #include "precompute/base/random_signs.h"
 #include "precompute/base/ranks.h"
+#include "precompute/base/scratch_pool.h"
 #include "precompute/compression/light_directions.h"
 #include "precompute/compression/light_weights.h"
 
@@ -116,11 +117,14 @@ class BasisSampler {
     const Ranks ranks;
     const auto rows = static_cast<Index>(frame_.tree.patch.size());
     MatrixXf light(rows, kSamples);
-    parallel_loop(kSamples / kGroupSamples, [&](std::size_t group) {
-      if (!ranks.makes(group)) return;
-      const Index begin = static_cast<Index>(group) * kGroupSamples;
-      draw_group(matrix, number * kSamples + begin, is_lit, light.middleCols(begin, kGroupSamples));
-    });
+    parallel_loop(
+        kSamples / kGroupSamples, 1, [&] { return workspaces_.lend(); },
+        [&](std::size_t group, const auto& workspace) {
+          if (!ranks.makes(group)) return;
+          const Index begin = static_cast<Index>(group) * kGroupSamples;
+          draw_group(matrix, number * kSamples + begin, is_lit, *workspace,
+                     light.middleCols(begin, kGroupSamples));
+        });
     ranks.share(std::span(light.data(), static_cast<std::size_t>(light.size())),
                 static_cast<std::size_t>(kGroupSamples * rows));
     Samples samples;
@@ -203,8 +207,7 @@ class BasisSampler {
   /// The samples from number `first` on.
   template <typename IsLit>
   void draw_group(std::uint32_t matrix, std::uint64_t first, const IsLit& is_lit,
-                  Eigen::Ref<MatrixXf> light) const {
-    SolvedTransfer::Workspace workspace;
+                  SolvedTransfer::Workspace& workspace, Eigen::Ref<MatrixXf> light) const {
     Vectors sent = Vectors::Zero(solved_.position_count(), kGroupSamples);
     for (std::size_t c = 0; c < cells_.size(); ++c) {
       const Cell& cell = cells_[c];
@@ -229,6 +232,7 @@ class BasisSampler {
   std::vector<ClusterWeight> weights_;  ///< of the cells
   std::vector<Cell> cells_;
   std::vector<std::uint32_t> group_;  ///< of each cell
+  mutable ScratchPool<SolvedTransfer::Workspace> workspaces_;
 };
 
 void append(MatrixXf& light, const MatrixXf& more) {

@@ -36,12 +36,10 @@ std::vector<SolvedMatrix::Run> SolvedMatrix::runs_of(std::uint32_t matrix,
     while (end < patches.size() && place_[patches[end]].cell == cell) ++end;
     const SharedBases::Basis& basis = bases_.bases[matrix][cell];
     const Index rank = vectors == Which::kAll ? basis.vectors.cols() : basis.far_rank;
-    Run& run = runs.emplace_back(Run{cell, static_cast<Index>(begin), {}});
-    run.vectors.resize(static_cast<Index>(end - begin), rank);
-    for (std::size_t k = begin; k < end; ++k) {
-      run.vectors.row(static_cast<Index>(k - begin)) =
-          basis.vectors.row(place_[patches[k]].index).head(rank);
-    }
+    std::vector<Index> rows;
+    for (std::size_t k = begin; k < end; ++k) rows.push_back(place_[patches[k]].index);
+    runs.push_back(
+        {cell, static_cast<Index>(begin), basis.vectors(rows, Eigen::seqN(Index{0}, rank))});
   }
   return runs;
 }

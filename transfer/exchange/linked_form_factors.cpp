@@ -25,6 +25,12 @@ constexpr std::size_t kNodesPerTask = 2048, kGatheredPerTask = 128;
 // Lists of links, of which a node has one for each kind of gradients, per task of sorting.
 constexpr std::size_t kSortedPerTask = 512;
 
+/// to += factor * from, lane by lane.
+template <typename Lanes>
+void add_scaled(Lanes& to, float factor, const Lanes& from) {
+  for (std::size_t lane = 0; lane < to.size(); ++lane) to[lane] += factor * from[lane];
+}
+
 /// The fastest function that gathers `Columns` along links on this processor.
 template <typename Columns>
 GatherAlongLinks<Columns> fastest_gather() {
@@ -197,7 +203,7 @@ class LinkedFormFactors::Tree {
   void sort_links(const GiveLinks& give);
 
   template <typename Columns, typename Lanes>
-  void pull(std::span<const Columns> in, LinkLightOf<Lanes>* light,
+  void pull(std::span<const Columns> in, const NodeLights<Lanes>& light,
             const Scheduler& scheduler) const;
   template <typename Lanes, typename Columns>
   void push(LinkLightOf<Lanes>* arrived, std::span<Columns> out, const Scheduler& scheduler) const;
@@ -321,17 +327,18 @@ void LinkedFormFactors::Tree::gather(std::span<const Columns> in, std::span<Colu
                                      GatherAlongLinks<Lanes> gather_node,
                                      const Scheduler& scheduler) const {
   assert(in.size() == patch_count() && out.size() == patch_count());
-  pull(in, light, scheduler);
+  const NodeLights<Lanes> sent(light, node_.size());
+  pull(in, sent, scheduler);
   parallel_for_pieces(scheduler, node_.size(), kGatheredPerTask, [&](std::size_t k) {
     const auto plain = plain_links(k);
     const auto affine = affine_links(k);
-    arrived[k] = gather_node({plain.data(), plain.size(), affine.data(), affine.size()}, light);
+    arrived[k] = gather_node({plain.data(), plain.size(), affine.data(), affine.size()}, sent);
   });
   push(arrived, out, scheduler);
 }
 
 template <typename Columns, typename Lanes>
-void LinkedFormFactors::Tree::pull(std::span<const Columns> in, LinkLightOf<Lanes>* light,
+void LinkedFormFactors::Tree::pull(std::span<const Columns> in, const NodeLights<Lanes>& light,
                                    const Scheduler& scheduler) const {
   for (std::size_t level = level_begin_.size() - 1; level-- > 0;) {
     const std::uint32_t begin = level_begin_[level], count = level_begin_[level + 1] - begin;
@@ -346,14 +353,16 @@ void LinkedFormFactors::Tree::pull(std::span<const Columns> in, LinkLightOf<Lane
         const std::uint32_t first = nodes_.first_child[k];
         for (std::uint32_t c = first; c < first + 2; ++c) {
           const Node& child = node_[c];
-          add_scaled(sum.mean, child.part, light[c].mean);
+          const Lanes& mean = light.mean_of(c);
+          add_scaled(sum.mean, child.part, mean);
           for (int axis = 0; axis < 3; ++axis) {
-            add_scaled(sum.first[axis], child.part, light[c].first[axis]);
-            add_scaled(sum.first[axis], child.part * child.from_parent[axis], light[c].mean);
+            add_scaled(sum.first[axis], child.part, light.first_of(c)[axis]);
+            add_scaled(sum.first[axis], child.part * child.from_parent[axis], mean);
           }
         }
       }
-      light[k] = sum;
+      light.mean_of(k) = sum.mean;
+      light.first_of(k) = sum.first;
     });
   }
 }

@@ -2,26 +2,62 @@
 
 #include "transfer/base/bfloat16.h"
 #include "transfer/kernels/link_kernels.h"
+#include "transfer/kernels/vector_load.h"
 
 namespace rebounce {
 
 // These functions are static: each file compiles its own copy for its instruction set.
 
-/// to += factor * from, lane by lane.
+namespace {
+
+/// A sum over links, lane by lane. Lanes of many lights stay in registers while links are added.
+/// Their bits do not depend on the instruction set.
 template <typename Lanes>
-static inline void add_scaled(Lanes& to, float factor, const Lanes& from) {
-  for (std::size_t lane = 0; lane < to.size(); ++lane) to[lane] += factor * from[lane];
-}
+class LaneSum {
+ public:
+  REBOUNCE_INLINE void add(float factor, const Lanes& from) {
+    unroll<kVectors>([&](auto k) REBOUNCE_INLINE {
+      Vector x;
+      __builtin_memcpy(&x, from.data() + k * kWidth, sizeof(Vector));
+      sum_[k] += factor * x;
+    });
+  }
+
+  REBOUNCE_INLINE void add(const LaneSum& other) {
+    unroll<kVectors>([&](auto k) REBOUNCE_INLINE { sum_[k] += other.sum_[k]; });
+  }
+
+  REBOUNCE_INLINE void store(Lanes& to) const {
+    unroll<kVectors>([&](auto k) REBOUNCE_INLINE {
+      __builtin_memcpy(to.data() + k * kWidth, &sum_[k], sizeof(Vector));
+    });
+  }
+
+ private:
+  using Value = typename Lanes::value_type;
+  // 32 bytes where they divide the lanes, 16 those of a colour, or single ones.
+  static constexpr std::size_t kBytes = sizeof(Lanes) % 32 == 0   ? 32
+                                        : sizeof(Lanes) % 16 == 0 ? 16
+                                                                  : sizeof(Value);
+  static constexpr std::size_t kWidth = kBytes / sizeof(Value), kVectors = sizeof(Lanes) / kBytes;
+  using Vector __attribute__((vector_size(kBytes))) = Value;
+
+  Vector sum_[kVectors] = {};
+};
+
+}  // namespace
 
 /// The flux that arrives along links without gradients.
 template <typename Lanes>
 static inline Lanes gather_along_plain_links(const PlainLink* link, std::size_t count,
-                                             const LinkLightOf<Lanes>* light) {
-  Lanes sum{};
+                                             const NodeLights<Lanes>& light) {
+  LaneSum<Lanes> sum;
   for (std::size_t l = 0; l < count; ++l) {
-    add_scaled(sum, link[l].exchange_area, light[link[l].from].mean);
+    sum.add(link[l].exchange_area, light.mean_of(link[l].from));
   }
-  return sum;
+  Lanes flux;
+  sum.store(flux);
+  return flux;
 }
 
 /// GatherAlongLinks in plain C++, for any number type and number of channels. Moments of many
@@ -29,24 +65,32 @@ static inline Lanes gather_along_plain_links(const PlainLink* link, std::size_t 
 /// one end; links of the same kind are next to each other.
 template <typename Lanes>
 static inline LinkLightOf<Lanes> gather_along_links(const LinksOfNode& links,
-                                                    const LinkLightOf<Lanes>* light) {
-  LinkLightOf<Lanes> sum{gather_along_plain_links<Lanes>(links.plain, links.plain_count, light),
-                         {}};
-  const IncomingLink* const link = links.affine;
+                                                    const NodeLights<Lanes>& light) {
+  LaneSum<Lanes> mean, first[3];
+  for (std::size_t l = 0; l < links.plain_count; ++l) {
+    mean.add(links.plain[l].exchange_area, light.mean_of(links.plain[l].from));
+  }
   for (std::size_t l = 0; l < links.affine_count; ++l) {
-    const LinkLightOf<Lanes>& from = light[link[l].from];
-    add_scaled(sum.mean, link[l].exchange_area, from.mean);
-    if (has_gradient(link[l].gradient_from)) {
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        add_scaled(sum.mean, bfloat16_to_float(link[l].gradient_from[axis]), from.first[axis]);
-      }
+    const IncomingLink& link = links.affine[l];
+    const Lanes& from = light.mean_of(link.from);
+    LaneSum<Lanes> flux;  // its terms apart, so that links do not wait for each other
+    flux.add(link.exchange_area, from);
+    if (has_gradient(link.gradient_from)) {
+      const std::array<Lanes, 3>& moments = light.first_of(link.from);
+      unroll<3>([&](auto axis) REBOUNCE_INLINE {
+        flux.add(bfloat16_to_float(link.gradient_from[axis]), moments[axis]);
+      });
     }
-    if (has_gradient(link[l].gradient_to)) {
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        add_scaled(sum.first[axis], bfloat16_to_float(link[l].gradient_to[axis]), from.mean);
-      }
+    mean.add(flux);
+    if (has_gradient(link.gradient_to)) {
+      unroll<3>([&](auto axis) REBOUNCE_INLINE {
+        first[axis].add(bfloat16_to_float(link.gradient_to[axis]), from);
+      });
     }
   }
+  LinkLightOf<Lanes> sum;
+  mean.store(sum.mean);
+  unroll<3>([&](auto axis) REBOUNCE_INLINE { first[axis].store(sum.first[axis]); });
   return sum;
 }
 

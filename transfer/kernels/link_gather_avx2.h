@@ -11,7 +11,7 @@
 namespace rebounce {
 namespace {
 
-LinkLight gather_avx2(const LinksOfNode& links, const LinkLight* light) {
+LinkLight gather_avx2(const LinksOfNode& links, const NodeLights<ColorLanes>& light) {
   // For each lane, the index of the gradient component that multiplies it; a link has six.
   const __m256i from_x = _mm256_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0);
   const __m256i from_yz = _mm256_setr_epi32(1, 1, 1, 1, 2, 2, 2, 2);
@@ -25,7 +25,7 @@ LinkLight gather_avx2(const LinksOfNode& links, const LinkLight* light) {
     // Both gradients and the two halves of `from`, which no lane uses.
     const __m128i bits = _mm_loadu_si128(reinterpret_cast<const __m128i*>(link + l));
     const __m256 gradient = _mm256_castsi256_ps(_mm256_slli_epi32(_mm256_cvtepu16_epi32(bits), 16));
-    const auto* from = reinterpret_cast<const float*>(light + link[l].from);
+    const auto* from = reinterpret_cast<const float*>(light.node(link[l].from));
     const __m256 mean = _mm256_broadcast_ps(reinterpret_cast<const __m128*>(from));
     const __m256 factor = _mm256_blend_ps(_mm256_permutevar8x32_ps(gradient, from_x),
                                           _mm256_broadcast_ss(&link[l].exchange_area), kFirst);

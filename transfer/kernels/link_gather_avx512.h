@@ -14,7 +14,7 @@ namespace {
 // Quarters of a register.
 constexpr __mmask16 kFirst = 0x000F, kOthers = 0xFFF0;
 
-LinkLight gather_avx512(const LinksOfNode& links, const LinkLight* light) {
+LinkLight gather_avx512(const LinksOfNode& links, const NodeLights<ColorLanes>& light) {
   // For each lane, the index of the gradient component that multiplies it; a link has six.
   const __m512i from_lanes = _mm512_setr_epi32(0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2);
   const __m512i to_lanes = _mm512_setr_epi32(0, 0, 0, 0, 3, 3, 3, 3, 4, 4, 4, 4, 5, 5, 5, 5);
@@ -25,7 +25,7 @@ LinkLight gather_avx512(const LinksOfNode& links, const LinkLight* light) {
     const __m128i bits = _mm_loadu_si128(reinterpret_cast<const __m128i*>(link + l));
     const __m512 gradient = _mm512_castps256_ps512(
         _mm256_castsi256_ps(_mm256_slli_epi32(_mm256_cvtepu16_epi32(bits), 16)));
-    const auto* from = reinterpret_cast<const float*>(light + link[l].from);
+    const auto* from = reinterpret_cast<const float*>(light.node(link[l].from));
     const __m512 factor = _mm512_mask_broadcastss_ps(_mm512_permutexvar_ps(from_lanes, gradient),
                                                      kFirst, _mm_load_ss(&link[l].exchange_area));
     along = _mm512_fmadd_ps(factor, _mm512_loadu_ps(from), along);

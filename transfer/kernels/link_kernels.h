@@ -21,6 +21,38 @@ struct LinkLightOf {
 using LinkLight = LinkLightOf<ColorLanes>;
 static_assert(sizeof(LinkLight) == 64);
 
+/// The light of nodes as links read it. Most links need no moments, and the moments of many lights
+/// fill cache lines of their own, so means and moments are apart.
+template <typename Lanes>
+class NodeLights {
+ public:
+  /// Lays out `count` nodes in `memory` [count].
+  NodeLights(LinkLightOf<Lanes>* memory, std::size_t count)
+      : mean_(reinterpret_cast<Lanes*>(memory)),
+        first_(reinterpret_cast<std::array<Lanes, 3>*>(mean_ + count)) {}
+
+  Lanes& mean_of(std::size_t node) const { return mean_[node]; }
+  std::array<Lanes, 3>& first_of(std::size_t node) const { return first_[node]; }
+
+ private:
+  Lanes* mean_;
+  std::array<Lanes, 3>* first_;
+};
+
+/// Of one light, all that a link can need is one cache line.
+template <>
+class NodeLights<ColorLanes> {
+ public:
+  NodeLights(LinkLight* memory, std::size_t /*count*/) : node_(memory) {}
+
+  ColorLanes& mean_of(std::size_t node) const { return node_[node].mean; }
+  std::array<ColorLanes, 3>& first_of(std::size_t node) const { return node_[node].first; }
+  const LinkLight* node(std::size_t node) const { return node_ + node; }
+
+ private:
+  LinkLight* node_;
+};
+
 /// The links of a node.
 struct LinksOfNode {
   const PlainLink* plain;
@@ -32,7 +64,7 @@ struct LinksOfNode {
 /// Returns what arrives at one node along its links.
 template <typename Lanes>
 using GatherAlongLinks = LinkLightOf<Lanes> (*)(const LinksOfNode& links,
-                                                const LinkLightOf<Lanes>* light);
+                                                const NodeLights<Lanes>& light);
 
 // The channels of eight lights.
 using ManyFloats = std::array<float, 24>;

@@ -6,7 +6,10 @@
 #include <atomic>
 #include <new>
 #include <numeric>
+#include <set>
 #include <vector>
+
+#include "precompute/base/scratch_pool.h"
 
 namespace rebounce::test_parallel_loop {
 namespace {
@@ -55,6 +58,26 @@ TEST(ParallelLoop, ThrowsWhatAScratchThrows) {
   const auto make = []() -> int { throw std::bad_alloc(); };
   const auto run = [&] { parallel_loop(100, 4, make, [](std::size_t, int) { FAIL(); }); };
   EXPECT_THROW(run(), std::bad_alloc);
+}
+
+TEST(ScratchPool, LendsEachToOneThreadAndKeepsWhatComesBack) {
+  ScratchPool<std::vector<int>> pool;
+  std::set<const std::vector<int>*> seen;
+  for (int loop = 0; loop < 10; ++loop) {
+    parallel_loop(
+        100, 1, [&] { return pool.lend(); },
+        [&](std::size_t, const auto& scratch) {
+          scratch->push_back(0);
+#pragma omp critical
+          seen.insert(scratch.get());
+        });
+  }
+  EXPECT_LE(seen.size(), static_cast<std::size_t>(omp_get_max_threads()));
+  std::size_t used = 0;
+  std::vector<ScratchPool<std::vector<int>>::Loan> loans;
+  for (std::size_t k = 0; k < seen.size(); ++k) used += loans.emplace_back(pool.lend())->size();
+  EXPECT_EQ(used, 1000);
+  EXPECT_TRUE(pool.lend()->empty());
 }
 
 }  // namespace
