@@ -14,12 +14,21 @@ namespace {
 /// Their bits do not depend on the instruction set.
 template <typename Lanes>
 class LaneSum {
+  using Value = typename Lanes::value_type;
+
  public:
-  REBOUNCE_INLINE void add(float factor, const Lanes& from) {
+  REBOUNCE_INLINE void set(Value factor, const Lanes& from) {
     unroll<kVectors>([&](auto k) REBOUNCE_INLINE {
-      Vector x;
-      __builtin_memcpy(&x, from.data() + k * kWidth, sizeof(Vector));
-      sum_[k] += factor * x;
+      load(from, k, sum_[k]);
+      sum_[k] *= factor;
+    });
+  }
+
+  REBOUNCE_INLINE void add(Value factor, const Lanes& from) {
+    unroll<kVectors>([&](auto k) REBOUNCE_INLINE {
+      Vector vector;
+      load(from, k, vector);
+      sum_[k] += factor * vector;
     });
   }
 
@@ -34,13 +43,26 @@ class LaneSum {
   }
 
  private:
-  using Value = typename Lanes::value_type;
-  // 32 bytes where they divide the lanes, 16 those of a colour, or single ones.
-  static constexpr std::size_t kBytes = sizeof(Lanes) % 32 == 0   ? 32
-                                        : sizeof(Lanes) % 16 == 0 ? 16
-                                                                  : sizeof(Value);
+#ifdef __AVX512F__
+  static constexpr std::size_t kRegister = 64;
+#else
+  static constexpr std::size_t kRegister = 32;
+#endif
+
+  /// The largest size of a vector that divides the lanes.
+  static constexpr std::size_t vector_bytes() {
+    for (std::size_t bytes = kRegister; bytes > sizeof(Value); bytes /= 2) {
+      if (sizeof(Lanes) % bytes == 0) return bytes;
+    }
+    return sizeof(Value);
+  }
+  static constexpr std::size_t kBytes = vector_bytes();
   static constexpr std::size_t kWidth = kBytes / sizeof(Value), kVectors = sizeof(Lanes) / kBytes;
   using Vector __attribute__((vector_size(kBytes))) = Value;
+
+  REBOUNCE_INLINE static void load(const Lanes& from, std::size_t k, Vector& vector) {
+    __builtin_memcpy(&vector, from.data() + k * kWidth, sizeof(Vector));
+  }
 
   Vector sum_[kVectors] = {};
 };
@@ -74,7 +96,7 @@ static inline LinkLightOf<Lanes> gather_along_links(const LinksOfNode& links,
     const IncomingLink& link = links.affine[l];
     const Lanes& from = light.mean_of(link.from);
     LaneSum<Lanes> flux;  // its terms apart, so that links do not wait for each other
-    flux.add(link.exchange_area, from);
+    flux.set(link.exchange_area, from);
     if (has_gradient(link.gradient_from)) {
       const std::array<Lanes, 3>& moments = light.first_of(link.from);
       unroll<3>([&](auto axis) REBOUNCE_INLINE {
