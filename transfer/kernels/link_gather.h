@@ -69,17 +69,14 @@ class LaneSum {
 
 }  // namespace
 
-/// The flux that arrives along links without gradients.
+/// Adds the flux that arrives along links without gradients.
 template <typename Lanes>
-static inline Lanes gather_along_plain_links(const PlainLink* link, std::size_t count,
-                                             const NodeLights<Lanes>& light) {
-  LaneSum<Lanes> sum;
-  for (std::size_t l = 0; l < count; ++l) {
-    sum.add(link[l].exchange_area, light.mean_of(link[l].from));
+REBOUNCE_INLINE static inline void add_plain_links(const LinksOfNode& links,
+                                                   const NodeLights<Lanes>& light,
+                                                   LaneSum<Lanes>& flux) {
+  for (std::size_t l = 0; l < links.plain_count; ++l) {
+    flux.add(links.plain[l].exchange_area, light.mean_of(links.plain[l].from));
   }
-  Lanes flux;
-  sum.store(flux);
-  return flux;
 }
 
 /// GatherAlongLinks in plain C++, for any number type and number of channels. Moments of many
@@ -89,9 +86,7 @@ template <typename Lanes>
 static inline LinkLightOf<Lanes> gather_along_links(const LinksOfNode& links,
                                                     const NodeLights<Lanes>& light) {
   LaneSum<Lanes> mean, first[3];
-  for (std::size_t l = 0; l < links.plain_count; ++l) {
-    mean.add(links.plain[l].exchange_area, light.mean_of(links.plain[l].from));
-  }
+  add_plain_links(links, light, mean);
   for (std::size_t l = 0; l < links.affine_count; ++l) {
     const IncomingLink& link = links.affine[l];
     const Lanes& from = light.mean_of(link.from);

@@ -38,7 +38,10 @@ LinkLight gather_avx2(const LinksOfNode& links, const NodeLights<ColorLanes>& li
     across[1] = _mm256_fmadd_ps(_mm256_permutevar8x32_ps(gradient, to_yz), mean, across[1]);
   }
   const __m256 both = _mm256_add_ps(along[0], along[1]);
-  const ColorLanes plain = gather_along_plain_links(links.plain, links.plain_count, light);
+  LaneSum<ColorLanes> plain_sum;
+  add_plain_links(links, light, plain_sum);
+  ColorLanes plain;
+  plain_sum.store(plain);
   const __m128 affine = _mm_add_ps(_mm256_castps256_ps128(both), _mm256_extractf128_ps(both, 1));
   const __m128 mean = _mm_add_ps(_mm_loadu_ps(plain.data()), affine);
   LinkLight sum;

@@ -32,7 +32,10 @@ LinkLight gather_avx512(const LinksOfNode& links, const NodeLights<ColorLanes>& 
     across = _mm512_fmadd_ps(_mm512_maskz_permutexvar_ps(kOthers, to_lanes, gradient),
                              _mm512_broadcast_f32x4(_mm_loadu_ps(from)), across);
   }
-  const ColorLanes plain = gather_along_plain_links(links.plain, links.plain_count, light);
+  LaneSum<ColorLanes> plain_sum;
+  add_plain_links(links, light, plain_sum);
+  ColorLanes plain;
+  plain_sum.store(plain);
   const __m128 affine =
       _mm_add_ps(_mm_add_ps(_mm512_castps512_ps128(along), _mm512_extractf32x4_ps(along, 1)),
                  _mm_add_ps(_mm512_extractf32x4_ps(along, 2), _mm512_extractf32x4_ps(along, 3)));
